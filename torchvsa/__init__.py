@@ -1,0 +1,30 @@
+"""Vector Symbolic Architectures in PyTorch: batched, exact where integers allow, and plain tensors throughout."""
+
+from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
+from torchvsa.encoding import Record, level, lookup
+from torchvsa.errors import ShapeError
+from torchvsa.memory import CleanUp, Match
+from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "ARCHITECTURES",
+    "BSC",
+    "FHRR",
+    "HRR",
+    "MAP",
+    "PROTECTIONS",
+    "VSA",
+    "CleanUp",
+    "FixedShift",
+    "Match",
+    "Protection",
+    "Record",
+    "SelfShift",
+    "ShapeError",
+    "Unprotected",
+    "architecture",
+    "level",
+    "lookup",
+]

@@ -1,0 +1,36 @@
+"""The architectures, by name."""
+
+from collections.abc import Callable
+from functools import partial
+
+import torch
+
+from torchvsa.architectures.base import VSA
+from torchvsa.architectures.bsc import BSC
+from torchvsa.architectures.fhrr import FHRR
+from torchvsa.architectures.hrr import HRR
+from torchvsa.architectures.map import MAP
+
+ARCHITECTURES: dict[str, Callable[..., VSA]] = {
+    "MAP-C": partial(MAP, variant="C"),
+    "MAP-B": partial(MAP, variant="B"),
+    "MAP-I": partial(MAP, variant="I"),
+    "HRR": HRR,
+    "FHRR": FHRR,
+    "BSC": BSC,
+}
+
+
+def architecture(name: str, dim: int, dtype: str | torch.dtype | None = None, **options: str) -> VSA:
+    """Make an architecture by its name in `ARCHITECTURES`; without a `dtype`, of its default type."""
+    if name not in ARCHITECTURES:
+        raise ValueError(f"there is no architecture {name!r}; choose one of {', '.join(ARCHITECTURES)}")
+    if isinstance(dtype, str):
+        found = getattr(torch, dtype, None)
+        if not isinstance(found, torch.dtype):
+            raise ValueError(f"there is no element type {dtype!r}; write e.g. 'float32' or 'int8'")
+        dtype = found
+    return ARCHITECTURES[name](dim=dim, **({} if dtype is None else {"dtype": dtype}), **options)
+
+
+__all__ = ["ARCHITECTURES", "BSC", "FHRR", "HRR", "MAP", "VSA", "architecture"]

@@ -1,0 +1,174 @@
+"""What every Vector Symbolic Architecture shares."""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import torch
+from jaxtyping import Bool, Float, Int, Shaped
+from torch import Tensor
+
+from torchvsa.errors import ShapeError
+from torchvsa.exact import divide, is_integer, norms, paired_dots, signed
+
+
+class VSA(ABC):
+    """A space of hypervectors of `dim` numbers, and the operations on them.
+
+    Hypervectors are plain tensors `[..., d]`; leading dimensions are batches. A **raw accumulator** is what
+    `superpose` returns: a sum that has not been normalised yet. `bind`, `unbind`, `permute` and `similarity`
+    accept it in place of a hypervector, which keeps them linear; `normalize` turns it into a hypervector.
+
+    A new architecture implements `random`, `identity`, `bind`, `unbind` and `normalize`, names itself, and is
+    listed in `torchvsa.architectures.ARCHITECTURES`.
+    """
+
+    name: str
+    elementwise: ClassVar[bool] = True
+    """Whether `bind` acts on every dimension by itself."""
+
+    def __init__(self, dim: int, dtype: torch.dtype) -> None:
+        if isinstance(dim, bool) or not isinstance(dim, int) or dim < 1:
+            raise ValueError(
+                f"dim is the number of elements of a hypervector, a positive integer; got {dim!r}"
+            )
+        self.dim = dim
+        self.dtype = dtype
+
+    def __repr__(self) -> str:
+        return f"{self.name}(dim={self.dim}, dtype={str(self.dtype).removeprefix('torch.')})"
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, VSA) and self.config() == other.config()
+
+    def __hash__(self) -> int:
+        return hash(repr(self))
+
+    def config(self) -> dict[str, str | int]:
+        """Name, dim and dtype, from which `torchvsa.architecture(**config)` makes an equal object."""
+        return {"name": self.name, "dim": self.dim, "dtype": str(self.dtype).removeprefix("torch.")}
+
+    @property
+    def integer(self) -> bool:
+        """Whether hypervectors and raw accumulators hold integers, so that every sum is exact."""
+        return is_integer(torch.empty(0, dtype=self.dtype))
+
+    @property
+    def accumulator(self) -> torch.dtype:
+        """The type of a raw accumulator: int32 for integer codes, else the type of the hypervectors."""
+        return torch.int32 if self.integer else self.dtype
+
+    # -- what an architecture defines ------------------------------------------------------------------
+
+    @abstractmethod
+    def random(
+        self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
+    ) -> Shaped[Tensor, "*shape d"]:
+        """Independent random hypervectors `[*shape, d]`.
+
+        They are drawn on the generator's device (the same seed gives the same bits wherever they go) and
+        moved to `device`. Without a generator PyTorch's global one is used.
+        """
+
+    @abstractmethod
+    def identity(self) -> Shaped[Tensor, "d"]:
+        """The hypervector that leaves others as they are when bound."""
+
+    @abstractmethod
+    def bind(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Join two hypervectors into one that is dissimilar to both. Commutes and is linear in each argument."""
+
+    @abstractmethod
+    def unbind(
+        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Undo `bind`: `unbind(bind(a, key), key)` is (or resembles) `a`."""
+
+    @abstractmethod
+    def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Turn a raw accumulator into a hypervector of this architecture."""
+
+    # -- what follows from it --------------------------------------------------------------------------
+
+    def permute(
+        self, x: Shaped[Tensor, "*batch d"], shifts: int | Int[Tensor, "*batch"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Rotate the elements to the right: element `i` moves to `(i + shift) mod d`.
+
+        `shifts` is one number, or a tensor with one for each hypervector (any shape that broadcasts with the
+        batch). Negative shifts rotate to the left.
+        """
+        self.check(x, "x")
+        if isinstance(shifts, int):
+            return torch.roll(x, shifts, -1)
+        batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
+        rows = x.expand(*batch, self.dim).reshape(-1, self.dim)
+        starts = (-shifts).remainder(self.dim).expand(batch).reshape(-1)
+        # A rotation is a window of the vector written twice: copying whole windows beats gathering elements.
+        windows = torch.cat([rows, rows], -1).unfold(-1, self.dim, 1)
+        return windows[torch.arange(len(rows), device=x.device), starts].reshape(*batch, self.dim)
+
+    def superpose(
+        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Sum `k` hypervectors over dimension `dim` into a raw accumulator.
+
+        `weights` holds one number per summand (`[k]`, or one for each batch element too: the shape of `xs`
+        up to and including `dim`). Integer codes with integer weights stay exact. Raises `ShapeError` if `dim` is the
+        hypervector dimension.
+        """
+        self.check(xs, "xs")
+        if xs.dim() < 2 or dim in (-1, xs.dim() - 1):
+            raise ShapeError(
+                f"bundling sums over one dimension beside the hypervectors' own; got shape {tuple(xs.shape)} and "
+                f"dim={dim}, expected e.g. [..., k, {self.dim}] and dim=-2"
+            )
+        votes = signed(xs)
+        if weights is not None:
+            if weights.is_floating_point() and is_integer(votes):
+                votes = votes.to(weights.dtype)
+            elif is_integer(votes):
+                votes = votes.to(torch.int32)
+            votes = votes.movedim(dim, -2) * weights.to(votes.dtype)[..., None]
+            dim = -2
+        return votes.sum(dim, dtype=self.accumulator if is_integer(votes) else None)
+
+    def bundle(
+        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Superpose `k` hypervectors into one that is similar to each of them: sum in one step, then normalise.
+
+        Order-free, but not associative: bundle all at once, or keep a raw accumulator.
+        Arguments as in `superpose`.
+        """
+        return self.normalize(self.superpose(xs, dim, weights))
+
+    def similarity(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
+    ) -> Float[Tensor, "*batch"]:
+        """Cosine of the angle between `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
+        self.check(a, "a")
+        self.check(b, "b")
+        return divide(paired_dots(a, b), norms(a) * norms(b)).to(torch.float32)
+
+    def positive(self, x: Shaped[Tensor, "*batch d"]) -> Bool[Tensor, "*batch d"]:
+        """The elements that count as > 0, from which a self-derived shift takes its width."""
+        return (x.real if x.is_complex() else signed(x)) > 0
+
+    def separate(
+        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Estimate `x` from `bundle([x, known])`, given `known`."""
+        return bundled - known
+
+    def unbound_norm(
+        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
+    ) -> Float[Tensor, "*batch"]:
+        """`norms(unbind(program, key))` for each key, in float64, without building the vectors where that pays."""
+        return norms(self.unbind(program, keys))
+
+    def check(self, x: Tensor, argument: str) -> None:
+        """Raise `ShapeError` unless `x` holds hypervectors of this dimension."""
+        if x.dim() == 0 or x.shape[-1] != self.dim:
+            raise ShapeError(f"{argument} must end in d = {self.dim} elements; got shape {tuple(x.shape)}")

@@ -1,0 +1,70 @@
+"""Fourier Holographic Reduced Representations."""
+
+import math
+
+import torch
+from jaxtyping import Float, Shaped
+from torch import Tensor
+
+from torchvsa.architectures.base import VSA
+from torchvsa.exact import divide
+
+
+class FHRR(VSA):
+    """Fourier HRR: elements are complex numbers of length 1, bind adds their angles.
+
+    bundle keeps the angle of the sum; an element that sums to 0 stays 0.
+
+    Source: Plate 1994; Gayler 2003.
+    """
+
+    name = "FHRR"
+
+    def __init__(self, dim: int, dtype: torch.dtype = torch.complex64) -> None:
+        if dtype not in (torch.complex64, torch.complex128):
+            raise ValueError(f"FHRR holds complex64 or complex128; got {dtype}")
+        super().__init__(dim, dtype)
+
+    def random(
+        self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
+    ) -> Shaped[Tensor, "*shape d"]:
+        """See `VSA.random`: angles uniform in [-π, π)."""
+        source = generator.device if generator is not None else device
+        real = torch.float64 if self.dtype == torch.complex128 else torch.float32
+        angles = (
+            torch.rand(*shape, self.dim, generator=generator, device=source, dtype=real) * (2 * math.pi)
+            - math.pi
+        )
+        return torch.polar(torch.ones_like(angles), angles).to(device if device is not None else source)
+
+    def identity(self) -> Shaped[Tensor, "d"]:
+        """All ones: every angle 0."""
+        return torch.ones(self.dim, dtype=self.dtype)
+
+    def bind(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """The element-wise complex product."""
+        return a * b
+
+    def unbind(
+        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """The product with the conjugate: exact for keys of length-1 elements."""
+        return bound * key.conj()
+
+    def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Scale every element to length 1; zero stays zero."""
+        return divide(raw, raw.abs())
+
+    def separate(
+        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """The angle of a sum of two lies midway, so x is `known` mirrored at the bundle."""
+        return bundled**2 * known.conj()
+
+    def unbound_norm(
+        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
+    ) -> Float[Tensor, "*batch"]:
+        """The root of `|key|² · |program|²`: one product for the whole batch."""
+        return (keys.abs() ** 2 @ (program.abs() ** 2)).to(torch.float64).sqrt()

@@ -1,0 +1,61 @@
+"""Holographic Reduced Representations."""
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from torchvsa.architectures.base import VSA
+from torchvsa.exact import divide, norms
+
+
+class HRR(VSA):
+    """Holographic Reduced Representations: bind is circular convolution, bundle the sum scaled to length 1.
+
+    Atoms are normal with variance 1/d. Unbinding is circular correlation: an approximate inverse.
+
+    Source: Plate 1995, "Holographic reduced representations".
+    """
+
+    name = "HRR"
+    elementwise = False
+
+    def __init__(self, dim: int, dtype: torch.dtype = torch.float32) -> None:
+        if dtype not in (torch.float32, torch.float64):
+            raise ValueError(f"HRR holds float32 or float64; got {dtype}")
+        super().__init__(dim, dtype)
+
+    def random(
+        self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
+    ) -> Shaped[Tensor, "*shape d"]:
+        """See `VSA.random`: normal with mean 0 and variance 1/d."""
+        source = generator.device if generator is not None else device
+        normal = torch.randn(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
+        return (normal / self.dim**0.5).to(device if device is not None else source)
+
+    def identity(self) -> Shaped[Tensor, "d"]:
+        """One at index 0, zero elsewhere."""
+        unit = torch.zeros(self.dim, dtype=self.dtype)
+        unit[0] = 1
+        return unit
+
+    def bind(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Circular convolution, by way of the Fourier transform."""
+        return torch.fft.irfft(torch.fft.rfft(a) * torch.fft.rfft(b), n=self.dim)
+
+    def unbind(
+        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Circular correlation: convolution with the key's approximate inverse."""
+        return torch.fft.irfft(torch.fft.rfft(bound) * torch.fft.rfft(key).conj(), n=self.dim)
+
+    def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Scale to length 1; zero stays zero."""
+        return divide(raw, norms(raw)[..., None].to(raw.dtype))
+
+    def separate(
+        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Estimate x from the bundle: two near-orthogonal vectors of length 1 have a sum of length √2."""
+        return self.normalize(bundled * 2**0.5 - known)

@@ -1,0 +1,126 @@
+"""Multiply-Add-Permute: the architecture of the paper."""
+
+from typing import Literal
+
+import torch
+from jaxtyping import Float, Shaped
+from torch import Tensor
+
+from torchvsa.architectures.base import VSA
+from torchvsa.architectures.draw import random_bits
+from torchvsa.architectures.ties import first_two
+from torchvsa.exact import dots, is_integer
+
+
+class MAP(VSA):
+    """Multiply-Add-Permute: bind is the product, bundle the sum, permute a rotation.
+
+    | variant | atoms | bundle |
+    |---|---|---|
+    | C | in [-1, 1] (bipolar, or `atoms="uniform"`) | the sum, clipped to [-1, 1] |
+    | B | -1 / +1 | the sign of the sum; a split vote is decided by `permute(bind(x1, x2), 1)` |
+    | I | -1 / +1 | the sum |
+
+    `dtype=torch.float32` is differentiable; `torch.int8` holds integer codes, exact and smallest, whose sums
+    accumulate in int32.
+
+    Source: Gayler 1998; Neubert et al. 2016, section II (variant C).
+    """
+
+    def __init__(
+        self,
+        dim: int,
+        variant: Literal["C", "B", "I"] = "C",
+        dtype: torch.dtype = torch.float32,
+        atoms: Literal["bipolar", "uniform"] = "bipolar",
+    ) -> None:
+        if variant not in ("C", "B", "I"):
+            raise ValueError(f"MAP has the variants 'C', 'B' and 'I'; got {variant!r}")
+        if dtype not in (torch.float32, torch.float64, torch.int8):
+            raise ValueError(f"MAP holds float32, float64 or int8 codes; got {dtype}")
+        if atoms not in ("bipolar", "uniform") or (
+            atoms == "uniform" and (variant != "C" or dtype == torch.int8)
+        ):
+            raise ValueError(
+                f"atoms are 'bipolar', or 'uniform' with variant 'C' and a float dtype; got {atoms!r} with {variant!r}, {dtype}"
+            )
+        super().__init__(dim, dtype)
+        self.variant = variant
+        self.atoms = atoms
+        self.name = f"MAP-{variant}"
+
+    def config(self) -> dict[str, str | int]:
+        """See `VSA.config`; names the atoms too where they are not the default."""
+        return super().config() | ({} if self.atoms == "bipolar" else {"atoms": self.atoms})
+
+    def random(
+        self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
+    ) -> Shaped[Tensor, "*shape d"]:
+        """See `VSA.random`: bipolar -1 / +1 with equal chance, or uniform in [-1, 1]."""
+        if self.atoms == "uniform":
+            source = generator.device if generator is not None else device
+            uniform = torch.rand(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
+            return (2 * uniform - 1).to(device if device is not None else source)
+        bits = random_bits(*shape, self.dim, generator=generator, device=device)
+        return (1 - 2 * bits.view(torch.int8)).to(self.dtype)
+
+    def identity(self) -> Shaped[Tensor, "d"]:
+        """All ones."""
+        return torch.ones(self.dim, dtype=self.dtype)
+
+    def bind(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """The element-wise product; its own inverse on -1 / +1."""
+        return a * b
+
+    def unbind(
+        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """The element-wise product again: exact for keys of -1 / +1."""
+        return bound * key
+
+    def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """C: clip to [-1, 1], keeping 0. I: the sum itself. B: the sign.
+
+        A raw sum no longer knows its voters, so B decides its zeros by the sum's own signs, shifted by one.
+        """
+        if self.variant == "C":
+            return raw.clamp(-1, 1).to(self.dtype)
+        if self.variant == "I":
+            return raw
+        return self._signs(raw, torch.roll(torch.where(raw >= 0, 1, -1), 1, -1))
+
+    def bundle(
+        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "*batch d"]:
+        """See `VSA.bundle`; the variants differ as the class says."""
+        raw = self.superpose(xs, dim, weights)
+        if self.variant == "B" and (voters := first_two(xs, dim, weights)) is not None:
+            return self._signs(raw, self.permute(self.bind(*voters), 1))
+        return self.normalize(raw)
+
+    def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
+        return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
+
+    def separate(
+        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """Estimate `x` from `bundle([x, known])`.
+
+        C: exact for a bipolar x (where the sum is 0, x = -known). I: exact. B: where the bundle differs from
+        `known`, x does too; elsewhere x is taken to agree, which is right for 3 of 4 elements in all.
+        """
+        if self.variant == "C":
+            return torch.where(bundled == 0, -known, bundled)
+        if self.variant == "I":
+            return bundled - known
+        return bundled
+
+    def unbound_norm(
+        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
+    ) -> Float[Tensor, "*batch"]:
+        """The root of `key² · program²`: one product for the whole batch."""
+        wide = torch.float64 if is_integer(program) else program.dtype
+        squares = dots(keys.to(wide) ** 2, program.to(wide)[None] ** 2)[..., 0]
+        return squares.to(torch.float64).sqrt()

@@ -1,0 +1,30 @@
+"""Who decides when the voters of a majority are split evenly."""
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from torchvsa.errors import ShapeError
+
+
+def first_two(
+    xs: Shaped[Tensor, "*batch k d"], dim: int, weights: Shaped[Tensor, "..."] | None
+) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch d"]] | None:
+    """The first two voters along `dim` that have a say (a weight other than 0), or None for fewer than two.
+
+    They make the voter that breaks ties, so that it depends on the vectors themselves: with one fixed tie
+    vector, unrelated bundles of an even number of voters would resemble each other (cosine .25).
+    """
+    xs = xs.movedim(dim, -2)
+    if xs.shape[-2] < 2:
+        return None
+    if weights is None:
+        return xs[..., 0, :], xs[..., 1, :]
+    if weights.shape[-1] != xs.shape[-2]:
+        raise ShapeError(
+            f"weights must hold one number for each of {xs.shape[-2]} voters; got {tuple(weights.shape)}"
+        )
+    silent = (weights == 0).to(torch.int8).expand(xs.shape[:-1])
+    order = silent.argsort(dim=-1, stable=True)[..., :2, None].expand(*xs.shape[:-2], 2, xs.shape[-1])
+    pair = xs.gather(-2, order)
+    return pair[..., 0, :], pair[..., 1, :]

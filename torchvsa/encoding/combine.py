@@ -1,0 +1,135 @@
+"""How the role-bound values of one record become one hypervector.
+
+A combination is a small class with two jobs: `prepare` turns the table of role-bound values `[n, V, d]` into
+the table it reads, one further entry at index V included for a value that was not observed; `join` combines
+the entries `[B, n, d]` of each record.
+"""
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import torch
+from jaxtyping import Bool, Shaped
+from torch import Tensor
+
+from torchvsa.architectures import VSA
+
+
+class Combination(ABC):
+    """Turns the n role-bound values of a record into its hypervector."""
+
+    name: ClassVar[str]
+
+    def __init__(self, vsa: VSA) -> None:
+        self.vsa = vsa
+
+    def bound(
+        self,
+        roles: Shaped[Tensor, "n d"],
+        values: Shaped[Tensor, "levels d"],
+        generator: torch.Generator | None,
+    ) -> Shaped[Tensor, "n levels d"]:
+        """The table of role-bound values."""
+        return self.vsa.bind(roles[:, None], values)
+
+    @abstractmethod
+    def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
+        """The entry that stands for a value that was not observed, and leaves the others as they are."""
+
+    @abstractmethod
+    def join(
+        self, entries: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """The record of each row."""
+
+
+class Bundled(Combination):
+    """The bundle of the role-bound values. Its kernel **averages** the kernels of the values.
+
+    Source: Neubert et al. 2016, Algorithm 1, line 3.
+    """
+
+    name = "bundle"
+
+    def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
+        """Zero (its weight is zero as well, so that it has no vote)."""
+        return torch.zeros_like(like[0, 0])
+
+    def join(
+        self, entries: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """Bundle those that were observed."""
+        return self.vsa.bundle(entries, weights=observed.to(torch.int32))
+
+
+class Bound(Combination):
+    """The product of the role-bound values. Its kernel **multiplies** the kernels of the values.
+
+    Binding commutes, so a product of roles and shared values would not say which sensor had which value;
+    the i-th role-bound value is therefore permuted i times.
+    """
+
+    name = "bind"
+
+    def bound(
+        self,
+        roles: Shaped[Tensor, "n d"],
+        values: Shaped[Tensor, "levels d"],
+        generator: torch.Generator | None,
+    ) -> Shaped[Tensor, "n levels d"]:
+        """The role-bound values, those of sensor i permuted i times."""
+        table = super().bound(roles, values, generator)
+        return self.vsa.permute(table, torch.arange(len(roles), device=roles.device)[:, None])
+
+    def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
+        """The identity of binding."""
+        return self.vsa.identity().to(like)
+
+    def join(
+        self, entries: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """Bind all."""
+        record = entries[:, 0]
+        for sensor in range(1, entries.shape[1]):
+            record = self.vsa.bind(record, entries[:, sensor])
+        return record
+
+
+class SubsetBound(Bound):
+    """The product over a random subset of the sensors, another one for each dimension of the hypervector.
+
+    Each dimension sees an interaction of at most `subset` sensors (of any number of them, by default), so
+    that sensors without a say disturb only the dimensions that hold them. Needs an architecture that binds
+    element by element.
+    """
+
+    name = "subset"
+
+    def __init__(self, vsa: VSA, subset: int | None = None) -> None:
+        super().__init__(vsa)
+        if not vsa.elementwise:
+            raise ValueError(
+                f"a subset of sensors per dimension needs element-wise binding, which {vsa.name} lacks"
+            )
+        if subset is not None and subset < 1:
+            raise ValueError(
+                f"subset is the largest number of sensors bound in one dimension, at least 1; got {subset}"
+            )
+        self.subset = subset
+
+    def bound(
+        self,
+        roles: Shaped[Tensor, "n d"],
+        values: Shaped[Tensor, "levels d"],
+        generator: torch.Generator | None,
+    ) -> Shaped[Tensor, "n levels d"]:
+        """The role-bound values, those of sensors outside a dimension's subset replaced by the identity."""
+        table = super().bound(roles, values, generator)
+        sensors = len(roles)
+        most = min(self.subset or sensors, sensors)
+        sizes = torch.randint(1, most + 1, (self.vsa.dim,), generator=generator)
+        ranks = torch.stack([torch.randperm(sensors, generator=generator) for _ in range(self.vsa.dim)], -1)
+        return torch.where((ranks < sizes)[:, None].to(table.device), table, self.unobserved(table))
+
+
+COMBINATIONS: dict[str, type[Combination]] = {c.name: c for c in (Bundled, Bound, SubsetBound)}

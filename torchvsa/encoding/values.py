@@ -1,0 +1,49 @@
+"""Codes for the values of one sensor or actuator: an index 0 .. levels-1 becomes a hypervector."""
+
+from collections.abc import Callable
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from torchvsa.architectures import VSA
+
+
+def lookup(vsa: VSA, levels: int, generator: torch.Generator | None = None) -> Shaped[Tensor, "levels d"]:
+    """A lookup table of independent random hypervectors: similarity 1 within a level, else about 0.
+
+    Source: Neubert et al. 2016, section II.
+    """
+    return vsa.random(levels, generator=generator)
+
+
+def level(
+    vsa: VSA, levels: int, generator: torch.Generator | None = None, span: int | None = None
+) -> Shaped[Tensor, "levels d"]:
+    """Level codes: similarity falls linearly with the distance, 1 - |i - j| / span, and is about 0 from `span` on.
+
+    Every `span` levels stands an independent random hypervector; between two of them, elements change
+    over one by one in random order. By default the span is the whole range, which makes the two ends
+    independent. `span=1` is the lookup table.
+
+    Source: Rachkovskij et al. 2005; Kleyko et al. 2018 for the linear kernel.
+    """
+    span = max(levels - 1, 1) if span is None else span
+    if span < 1:
+        raise ValueError(f"span counts the levels over which similarity falls to 0, at least 1; got {span}")
+    segments = -(-(levels - 1) // span) if levels > 1 else 0
+    anchors = vsa.random(segments + 1, generator=generator)
+    orders = [torch.randperm(vsa.dim, generator=generator) for _ in range(segments)]
+    codes = []
+    for index in range(levels):
+        segment, step = divmod(index, span)
+        if step == 0:
+            codes.append(anchors[segment])
+        else:
+            # Integer comparison: exactly round-down(d · step / span) elements have changed over.
+            changed = orders[segment] * span < vsa.dim * step
+            codes.append(torch.where(changed.to(anchors.device), anchors[segment + 1], anchors[segment]))
+    return torch.stack(codes)
+
+
+VALUES: dict[str, Callable[..., Tensor]] = {"lookup": lookup, "level": level}

@@ -1,0 +1,61 @@
+"""Products and norms of hypervectors, exact wherever the type is an integer.
+
+The type alone says which path runs: boolean vectors count as -1 / +1, integer products are exact, complex
+ones are Hermitian and give their real part. No value is looked at, so nothing here stalls a GPU or breaks a
+graph.
+"""
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+
+def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
+    """Bits as votes (False: +1, True: -1, so that XOR is a product); any other tensor as it is."""
+    return 1 - 2 * x.to(torch.int8) if x.dtype == torch.bool else x
+
+
+def is_integer(x: Tensor) -> bool:
+    """Whether a tensor holds integers (bits included), whose sums and products are exact."""
+    return not (x.is_floating_point() or x.is_complex())
+
+
+def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
+    """The inner product of each query with each item.
+
+    Integers: exact (int8 by int8 accumulates in int32, anything wider in float64, exact below 2^53).
+    Complex: the real part of the Hermitian product.
+    """
+    a, b = signed(queries), signed(items)
+    if a.is_complex() or b.is_complex():
+        # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
+        return torch.view_as_real(a).flatten(-2) @ torch.view_as_real(b).flatten(-2).T
+    if a.dtype == torch.int8 and b.dtype == torch.int8 and a.device.type == "cpu":
+        return torch._int_mm(a.reshape(-1, a.shape[-1]), b.T).reshape(*a.shape[:-1], len(b))
+    if is_integer(a) or is_integer(b):
+        # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
+        wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)
+        return a.to(wide) @ b.to(wide).T
+    wide = torch.promote_types(a.dtype, b.dtype)
+    return a.to(wide) @ b.to(wide).T
+
+
+def paired_dots(a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
+    """The inner product of a with b, element by element of the (broadcast) batch; exact for integers."""
+    a, b = signed(a), signed(b)
+    if a.is_complex() or b.is_complex():
+        return (a * b.conj()).real.sum(-1)
+    if is_integer(a) and is_integer(b):
+        return (a.to(torch.int64) * b).sum(-1)
+    return (a * b).sum(-1)
+
+
+def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
+    """Euclidean length in float64 (integers: the root of an exact sum), with a gradient of 0 at the zero vector."""
+    squares = paired_dots(x, x).to(torch.float64)
+    return torch.where(squares > 0, torch.where(squares > 0, squares, 1.0).sqrt(), 0.0)
+
+
+def divide(values: Shaped[Tensor, "*s"], lengths: Shaped[Tensor, "*t"]) -> Shaped[Tensor, "*s"]:
+    """`values / lengths`, and 0 where the length is 0: a zero vector is similar to nothing."""
+    return torch.where(lengths > 0, values / torch.where(lengths > 0, lengths, 1.0), 0.0)

@@ -1,0 +1,173 @@
+"""Protection: a permutation that hides a hypervector's structure from the vectors it is bundled with.
+
+The paper protects every condition, so that conditions which share sensor values do not blur each other. A
+protection has two verbs: `protect(x)` and `protect.invert(y)`.
+"""
+
+from typing import ClassVar, Literal
+
+import torch
+from jaxtyping import Int, Shaped
+from torch import Tensor, nn
+
+from torchvsa.architectures import VSA
+from torchvsa.exact import is_integer, signed
+
+
+class Protection(nn.Module):
+    """A map of hypervectors to hypervectors `[..., d] -> [..., d]`, with an inverse (exact or estimated)."""
+
+    name: ClassVar[str]
+
+    def __init__(self, vsa: VSA) -> None:
+        super().__init__()
+        self.vsa = vsa
+
+    def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Protect `x`."""
+        raise NotImplementedError
+
+    def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Recover `x` from `y = protect(x)`."""
+        raise NotImplementedError
+
+    def config(self) -> dict[str, str]:
+        """The name and options from which `torchvsa.protection` makes it again."""
+        return {"name": self.name}
+
+
+class Unprotected(Protection):
+    """No protection: similar conditions stay similar, so that a program can generalise between them."""
+
+    name = "none"
+
+    def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """`x` itself."""
+        return x
+
+    def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """`y` itself."""
+        return y
+
+
+class FixedShift(Protection):
+    """A circular right shift by the same `shift` for all: quotes a vector, keeps every similarity."""
+
+    name = "fixed_shift"
+
+    def __init__(self, vsa: VSA, shift: int = 1) -> None:
+        super().__init__(vsa)
+        self.shift = shift
+
+    def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Shift to the right."""
+        return self.vsa.permute(x, self.shift)
+
+    def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Shift back."""
+        return self.vsa.permute(y, -self.shift)
+
+    def config(self) -> dict[str, str]:
+        """See `Protection.config`."""
+        return {"name": self.name, "shift": str(self.shift)}
+
+
+class SelfShift(Protection):
+    """The paper's: shift by a width `w` computed from the vector itself, and superpose the name of `w`.
+
+        protect(x) = shift(bundle(x, h), w(x))
+
+    for one random hypervector `h`: the name of the width is `H[w] = shift(h, w)`, so that all d names cost d
+    numbers and are near-orthogonal.
+
+    | `width` | w | |
+    |---|---|---|
+    | `"mean"` | average index of the elements > 0, rounded half up | the paper's; spreads over about √(d/12) widths either side of d/2 |
+    | `"sum"` | sum of those indices, mod d | spreads evenly over all d widths |
+
+    Widths come from exact integer sums, so they do not depend on batch size, type or device. No element
+    above 0 gives width 0.
+
+    It acts as a hash: conditions that differ in one of three sensors become all but unrelated.
+    Source: Neubert et al. 2016, section II.
+    """
+
+    name = "self_shift"
+    h: Tensor
+
+    def __init__(
+        self,
+        vsa: VSA,
+        width: Literal["mean", "sum"] = "mean",
+        seed: int = 0,
+        h: Shaped[Tensor, "d"] | None = None,
+    ) -> None:
+        super().__init__(vsa)
+        if width not in ("mean", "sum"):
+            raise ValueError(f"the width of a self-derived shift is 'mean' or 'sum'; got {width!r}")
+        self.width_rule = width
+        if h is None:
+            h = vsa.random(generator=torch.Generator().manual_seed(seed))
+        self.register_buffer("h", h)
+        # Indices in base 128, so that their sums are exact products of int8 on any device.
+        digits = [torch.arange(vsa.dim) // 128**place % 128 for place in range(_places(vsa.dim))]
+        columns = torch.stack([torch.ones(vsa.dim, dtype=torch.int64), *digits])
+        self.register_buffer("columns", columns.to(torch.int8), persistent=False)
+
+    def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
+        """The shift width of each vector, an integer in [0, d)."""
+        count, *digit_sums = _index_sums(self.vsa.positive(x), self.get_buffer("columns")).unbind(-1)
+        total = sum(digits * 128**place for place, digits in enumerate(digit_sums))
+        assert isinstance(total, Tensor)
+        if self.width_rule == "sum":
+            return total % self.vsa.dim
+        return (2 * total + count) // (2 * count).clamp(min=1)
+
+    def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Superpose `x` with `h`, then shift by the width of `x`."""
+        named = self.vsa.bundle(torch.stack(torch.broadcast_tensors(x, self.h.to(x.dtype)), -2))
+        return self.vsa.permute(named, self.width(x))
+
+    def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
+        """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""
+        spectrum, reference = (torch.fft.fft(_floats(v)) for v in (y, self.h))
+        return torch.fft.ifft(spectrum * reference.conj()).real.argmax(-1)
+
+    def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """Decode the width, shift back and take `h` out.
+
+        Exact for bipolar x in MAP-C and MAP-I (where the superposition is 0, x = -h), up to rounding in
+        FHRR; an estimate, similar to x, for other x and in the other architectures.
+        """
+        return self.vsa.separate(self.vsa.permute(y, -self.decode(y)), self.h.to(y.dtype))
+
+    def config(self) -> dict[str, str]:
+        """See `Protection.config`; `h` itself is kept as a tensor."""
+        return {"name": self.name, "width": self.width_rule}
+
+
+def _places(dim: int) -> int:
+    """Digits in base 128 of the largest index."""
+    places = 1
+    while 128**places < dim:
+        places += 1
+    return places
+
+
+def _index_sums(mask: Tensor, columns: Tensor) -> Tensor:
+    """`[..., d]` bits by `[c, d]` int8 columns: exact int64 sums `[..., c]`."""
+    if mask.device.type == "cpu":
+        flat = mask.reshape(-1, mask.shape[-1]).to(torch.int8)
+        sums = torch._int_mm(flat, columns.T)
+    else:
+        # At most 127 · d < 2^24 for d up to 132,000, and float64 beyond any d.
+        sums = mask.reshape(-1, mask.shape[-1]).to(torch.float64) @ columns.T.to(torch.float64)
+    return sums.to(torch.int64).reshape(*mask.shape[:-1], len(columns))
+
+
+def _floats(x: Tensor) -> Tensor:
+    x = signed(x)
+    return x.to(torch.float32) if is_integer(x) else x
+
+
+PROTECTIONS: dict[str, type[Protection]] = {p.name: p for p in (SelfShift, FixedShift, Unprotected)}
