@@ -31,7 +31,8 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
         return torch.view_as_real(a).flatten(-2) @ torch.view_as_real(b).flatten(-2).T
     if a.dtype == torch.int8 and b.dtype == torch.int8 and a.device.type == "cpu":
-        return torch._int_mm(a.reshape(-1, a.shape[-1]), b.T).reshape(*a.shape[:-1], len(b))
+        # The int8 units of the CPU, summing in int32.
+        return torch.ops.aten._int_mm(a.reshape(-1, a.shape[-1]), b.T).reshape(*a.shape[:-1], len(b))
     if is_integer(a) or is_integer(b):
         # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
         wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)

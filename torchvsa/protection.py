@@ -11,7 +11,7 @@ from jaxtyping import Int, Shaped
 from torch import Tensor, nn
 
 from torchvsa.architectures import VSA
-from torchvsa.exact import is_integer, signed
+from torchvsa.exact import dots, is_integer, signed
 
 
 class Protection(nn.Module):
@@ -82,7 +82,7 @@ class SelfShift(Protection):
 
     | `width` | w | |
     |---|---|---|
-    | `"mean"` | average index of the elements > 0, rounded half up | the paper's; spreads over about √(d/12) widths either side of d/2 |
+    | `"mean"` | average index of the elements > 0, rounded half up | the paper's; spreads over √(d/12) widths around d/2 |
     | `"sum"` | sum of those indices, mod d | spreads evenly over all d widths |
 
     Widths come from exact integer sums, so they do not depend on batch size, type or device. No element
@@ -94,6 +94,8 @@ class SelfShift(Protection):
 
     name = "self_shift"
     h: Tensor
+    columns: Tensor
+    places: Tensor
 
     def __init__(
         self,
@@ -110,15 +112,16 @@ class SelfShift(Protection):
             h = vsa.random(generator=torch.Generator().manual_seed(seed))
         self.register_buffer("h", h)
         # Indices in base 128, so that their sums are exact products of int8 on any device.
-        digits = [torch.arange(vsa.dim) // 128**place % 128 for place in range(_places(vsa.dim))]
-        columns = torch.stack([torch.ones(vsa.dim, dtype=torch.int64), *digits])
+        places = 128 ** torch.arange(_places(vsa.dim))
+        digits = torch.arange(vsa.dim) // places[:, None] % 128
+        columns = torch.cat([torch.ones(1, vsa.dim, dtype=torch.int64), digits])
         self.register_buffer("columns", columns.to(torch.int8), persistent=False)
+        self.register_buffer("places", places, persistent=False)
 
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""
-        count, *digit_sums = _index_sums(self.vsa.positive(x), self.get_buffer("columns")).unbind(-1)
-        total = sum(digits * 128**place for place, digits in enumerate(digit_sums))
-        assert isinstance(total, Tensor)
+        sums = dots(self.vsa.positive(x).to(torch.int8), self.columns).to(torch.int64)
+        count, total = sums[..., 0], sums[..., 1:] @ self.places
         if self.width_rule == "sum":
             return total % self.vsa.dim
         return (2 * total + count) // (2 * count).clamp(min=1)
@@ -152,17 +155,6 @@ def _places(dim: int) -> int:
     while 128**places < dim:
         places += 1
     return places
-
-
-def _index_sums(mask: Tensor, columns: Tensor) -> Tensor:
-    """`[..., d]` bits by `[c, d]` int8 columns: exact int64 sums `[..., c]`."""
-    if mask.device.type == "cpu":
-        flat = mask.reshape(-1, mask.shape[-1]).to(torch.int8)
-        sums = torch._int_mm(flat, columns.T)
-    else:
-        # At most 127 · d < 2^24 for d up to 132,000, and float64 beyond any d.
-        sums = mask.reshape(-1, mask.shape[-1]).to(torch.float64) @ columns.T.to(torch.float64)
-    return sums.to(torch.int64).reshape(*mask.shape[:-1], len(columns))
 
 
 def _floats(x: Tensor) -> Tensor:

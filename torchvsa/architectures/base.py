@@ -28,9 +28,7 @@ class VSA(ABC):
 
     def __init__(self, dim: int, dtype: torch.dtype) -> None:
         if isinstance(dim, bool) or not isinstance(dim, int) or dim < 1:
-            raise ValueError(
-                f"dim is the number of elements of a hypervector, a positive integer; got {dim!r}"
-            )
+            raise ValueError(f"dim is the number of elements of a hypervector, a positive integer; got {dim!r}")
         self.dim = dim
         self.dtype = dtype
 
@@ -74,15 +72,11 @@ class VSA(ABC):
         """The hypervector that leaves others as they are when bound."""
 
     @abstractmethod
-    def bind(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Join two hypervectors into one that is dissimilar to both. Commutes and is linear in each argument."""
 
     @abstractmethod
-    def unbind(
-        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Undo `bind`: `unbind(bind(a, key), key)` is (or resembles) `a`."""
 
     @abstractmethod
@@ -91,9 +85,7 @@ class VSA(ABC):
 
     # -- what follows from it --------------------------------------------------------------------------
 
-    def permute(
-        self, x: Shaped[Tensor, "*batch d"], shifts: int | Int[Tensor, "*batch"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def permute(self, x: Shaped[Tensor, "*batch d"], shifts: int | Int[Tensor, "*batch"]) -> Shaped[Tensor, "*batch d"]:
         """Rotate the elements to the right: element `i` moves to `(i + shift) mod d`.
 
         `shifts` is one number, or a tensor with one for each hypervector (any shape that broadcasts with the
@@ -144,10 +136,8 @@ class VSA(ABC):
         """
         return self.normalize(self.superpose(xs, dim, weights))
 
-    def similarity(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
-    ) -> Float[Tensor, "*batch"]:
-        """Cosine of the angle between `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
+    def similarity(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
+        """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
         self.check(a, "a")
         self.check(b, "b")
         return divide(paired_dots(a, b), norms(a) * norms(b)).to(torch.float32)
@@ -162,9 +152,7 @@ class VSA(ABC):
         """Estimate `x` from `bundle([x, known])`, given `known`."""
         return bundled - known
 
-    def unbound_norm(
-        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
-    ) -> Float[Tensor, "*batch"]:
+    def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """`norms(unbind(program, key))` for each key, in float64, without building the vectors where that pays."""
         return norms(self.unbind(program, keys))
 

@@ -37,17 +37,13 @@ class BSC(VSA):
         """No bit set."""
         return torch.zeros(self.dim, dtype=torch.bool)
 
-    def bind(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """XOR; with a raw accumulator, its votes are negated where the other's bit is set."""
         if a.dtype == torch.bool and b.dtype == torch.bool:
             return a ^ b
         return signed(a) * signed(b)
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """XOR again, an exact inverse."""
         return self.bind(bound, key)
 
@@ -74,8 +70,6 @@ class BSC(VSA):
         """Where the bundle differs from `known`, x does too; elsewhere x is taken to agree."""
         return bundled
 
-    def unbound_norm(
-        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
-    ) -> Float[Tensor, "*batch"]:
+    def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """Bits only flip signs: the program's own length, for every key."""
         return norms(program).expand(keys.shape[:-1])

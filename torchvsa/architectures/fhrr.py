@@ -31,25 +31,18 @@ class FHRR(VSA):
         """See `VSA.random`: angles uniform in [-π, π)."""
         source = generator.device if generator is not None else device
         real = torch.float64 if self.dtype == torch.complex128 else torch.float32
-        angles = (
-            torch.rand(*shape, self.dim, generator=generator, device=source, dtype=real) * (2 * math.pi)
-            - math.pi
-        )
+        angles = torch.rand(*shape, self.dim, generator=generator, device=source, dtype=real) * (2 * math.pi) - math.pi
         return torch.polar(torch.ones_like(angles), angles).to(device if device is not None else source)
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """All ones: every angle 0."""
         return torch.ones(self.dim, dtype=self.dtype)
 
-    def bind(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The element-wise complex product."""
         return a * b
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The product with the conjugate: exact for keys of length-1 elements."""
         return bound * key.conj()
 
@@ -63,8 +56,6 @@ class FHRR(VSA):
         """The angle of a sum of two lies midway, so x is `known` mirrored at the bundle."""
         return bundled**2 * known.conj()
 
-    def unbound_norm(
-        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
-    ) -> Float[Tensor, "*batch"]:
+    def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `|key|² · |program|²`: one product for the whole batch."""
         return (keys.abs() ** 2 @ (program.abs() ** 2)).to(torch.float64).sqrt()

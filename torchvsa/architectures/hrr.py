@@ -38,15 +38,11 @@ class HRR(VSA):
         unit[0] = 1
         return unit
 
-    def bind(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Circular convolution, by way of the Fourier transform."""
         return torch.fft.irfft(torch.fft.rfft(a) * torch.fft.rfft(b), n=self.dim)
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Circular correlation: convolution with the key's approximate inverse."""
         return torch.fft.irfft(torch.fft.rfft(bound) * torch.fft.rfft(key).conj(), n=self.dim)
 

@@ -38,11 +38,10 @@ class MAP(VSA):
             raise ValueError(f"MAP has the variants 'C', 'B' and 'I'; got {variant!r}")
         if dtype not in (torch.float32, torch.float64, torch.int8):
             raise ValueError(f"MAP holds float32, float64 or int8 codes; got {dtype}")
-        if atoms not in ("bipolar", "uniform") or (
-            atoms == "uniform" and (variant != "C" or dtype == torch.int8)
-        ):
+        if atoms not in ("bipolar", "uniform") or (atoms == "uniform" and (variant != "C" or dtype == torch.int8)):
             raise ValueError(
-                f"atoms are 'bipolar', or 'uniform' with variant 'C' and a float dtype; got {atoms!r} with {variant!r}, {dtype}"
+                f"atoms are 'bipolar', or 'uniform' with variant 'C' and a float dtype; "
+                f"got {atoms!r} with {variant!r}, {dtype}"
             )
         super().__init__(dim, dtype)
         self.variant = variant
@@ -68,15 +67,11 @@ class MAP(VSA):
         """All ones."""
         return torch.ones(self.dim, dtype=self.dtype)
 
-    def bind(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The element-wise product; its own inverse on -1 / +1."""
         return a * b
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The element-wise product again: exact for keys of -1 / +1."""
         return bound * key
 
@@ -117,9 +112,7 @@ class MAP(VSA):
             return bundled - known
         return bundled
 
-    def unbound_norm(
-        self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]
-    ) -> Float[Tensor, "*batch"]:
+    def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `key² · program²`: one product for the whole batch."""
         wide = torch.float64 if is_integer(program) else program.dtype
         squares = dots(keys.to(wide) ** 2, program.to(wide)[None] ** 2)[..., 0]

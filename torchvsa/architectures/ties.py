@@ -21,9 +21,7 @@ def first_two(
     if weights is None:
         return xs[..., 0, :], xs[..., 1, :]
     if weights.shape[-1] != xs.shape[-2]:
-        raise ShapeError(
-            f"weights must hold one number for each of {xs.shape[-2]} voters; got {tuple(weights.shape)}"
-        )
+        raise ShapeError(f"weights must hold one number for each of {xs.shape[-2]} voters; got {tuple(weights.shape)}")
     silent = (weights == 0).to(torch.int8).expand(xs.shape[:-1])
     order = silent.argsort(dim=-1, stable=True)[..., :2, None].expand(*xs.shape[:-2], 2, xs.shape[-1])
     pair = xs.gather(-2, order)

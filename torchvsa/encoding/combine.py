@@ -108,9 +108,7 @@ class SubsetBound(Bound):
     def __init__(self, vsa: VSA, subset: int | None = None) -> None:
         super().__init__(vsa)
         if not vsa.elementwise:
-            raise ValueError(
-                f"a subset of sensors per dimension needs element-wise binding, which {vsa.name} lacks"
-            )
+            raise ValueError(f"a subset of sensors per dimension needs element-wise binding, which {vsa.name} lacks")
         if subset is not None and subset < 1:
             raise ValueError(
                 f"subset is the largest number of sensors bound in one dimension, at least 1; got {subset}"

@@ -13,7 +13,7 @@ from torchvsa.exact import divide, dots, norms
 class Match(NamedTuple):
     """What a clean-up memory answers, one entry per query."""
 
-    index: Int[Tensor, "*batch"]
+    index: Int[Tensor, "*batch"]  # pyright: ignore[reportIncompatibleMethodOverride] (the field's own word for it)
     """The most similar item; equal similarities go to the lowest index."""
     similarity: Float[Tensor, "*batch"]
     """Its cosine with the query."""
@@ -48,9 +48,7 @@ class CleanUp(nn.Module):
     def __init__(self, items: Shaped[Tensor, "k d"]) -> None:
         super().__init__()
         if items.dim() != 2 or len(items) == 0:
-            raise ShapeError(
-                f"a clean-up memory needs items [K, d] with K at least 1; got shape {tuple(items.shape)}"
-            )
+            raise ShapeError(f"a clean-up memory needs items [K, d] with K at least 1; got shape {tuple(items.shape)}")
         self.register_buffer("items", items)
         self.register_buffer("lengths", norms(items), persistent=False)
 
