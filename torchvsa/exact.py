@@ -29,7 +29,9 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     a, b = signed(queries), signed(items)
     if a.is_complex() or b.is_complex():
         # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
-        return torch.view_as_real(a).flatten(-2) @ torch.view_as_real(b).flatten(-2).T
+        wide = torch.promote_types(a.dtype, b.dtype)
+        a, b = (torch.view_as_real(x.to(wide).resolve_conj()).flatten(-2) for x in (a, b))
+        return a @ b.T
     if a.dtype == torch.int8 and b.dtype == torch.int8 and a.device.type == "cpu":
         # The int8 units of the CPU, summing in int32.
         return torch.ops.aten._int_mm(a.reshape(-1, a.shape[-1]), b.T).reshape(*a.shape[:-1], len(b))
@@ -53,7 +55,12 @@ def paired_dots(a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) ->
 
 def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
     """Euclidean length in float64 (integers: the root of an exact sum), with a gradient of 0 at the zero vector."""
-    squares = paired_dots(x, x).to(torch.float64)
+    return root(paired_dots(x, x))
+
+
+def root(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
+    """The square root in float64, with a gradient of 0 at 0."""
+    squares = squares.to(torch.float64)
     return torch.where(squares > 0, torch.where(squares > 0, squares, 1.0).sqrt(), 0.0)
 
 

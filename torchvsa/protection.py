@@ -31,7 +31,7 @@ class Protection(nn.Module):
         """Recover `x` from `y = protect(x)`."""
         raise NotImplementedError
 
-    def config(self) -> dict[str, str]:
+    def config(self) -> dict[str, str | int]:
         """The name and options from which `torchvsa.protection` makes it again."""
         return {"name": self.name}
 
@@ -67,9 +67,9 @@ class FixedShift(Protection):
         """Shift back."""
         return self.vsa.permute(y, -self.shift)
 
-    def config(self) -> dict[str, str]:
+    def config(self) -> dict[str, str | int]:
         """See `Protection.config`."""
-        return {"name": self.name, "shift": str(self.shift)}
+        return {"name": self.name, "shift": self.shift}
 
 
 class SelfShift(Protection):
@@ -82,7 +82,7 @@ class SelfShift(Protection):
 
     | `width` | w | |
     |---|---|---|
-    | `"mean"` | average index of the elements > 0, rounded half up | the paper's; spreads over √(d/12) widths around d/2 |
+    | `"mean"` | average index of the elements > 0, rounded half up | the paper's; about √(d/12) widths around d/2 |
     | `"sum"` | sum of those indices, mod d | spreads evenly over all d widths |
 
     Widths come from exact integer sums, so they do not depend on batch size, type or device. No element
@@ -121,13 +121,14 @@ class SelfShift(Protection):
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""
         sums = dots(self.vsa.positive(x).to(torch.int8), self.columns).to(torch.int64)
-        count, total = sums[..., 0], sums[..., 1:] @ self.places
+        count, total = sums[..., 0], (sums[..., 1:] * self.places).sum(-1)
         if self.width_rule == "sum":
             return total % self.vsa.dim
         return (2 * total + count) // (2 * count).clamp(min=1)
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Superpose `x` with `h`, then shift by the width of `x`."""
+        self.vsa.check(x, "x")
         named = self.vsa.bundle(torch.stack(torch.broadcast_tensors(x, self.h.to(x.dtype)), -2))
         return self.vsa.permute(named, self.width(x))
 
@@ -144,7 +145,7 @@ class SelfShift(Protection):
         """
         return self.vsa.separate(self.vsa.permute(y, -self.decode(y)), self.h.to(y.dtype))
 
-    def config(self) -> dict[str, str]:
+    def config(self) -> dict[str, str | int]:
         """See `Protection.config`; `h` itself is kept as a tensor."""
         return {"name": self.name, "width": self.width_rule}
 

@@ -1,0 +1,10 @@
+"""Learning rules, by name."""
+
+from behaviours.learning.base import Rule
+from behaviours.learning.error_driven import ErrorDriven
+from behaviours.learning.one_shot import OneShot
+from behaviours.report import LearningReport
+
+RULES: dict[str, type[Rule]] = {rule.name: rule for rule in (OneShot, ErrorDriven)}
+
+__all__ = ["RULES", "ErrorDriven", "LearningReport", "OneShot", "Rule"]

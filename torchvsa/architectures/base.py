@@ -97,6 +97,11 @@ class VSA(ABC):
         batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
         rows = x.expand(*batch, self.dim).reshape(-1, self.dim)
         starts = (-shifts).remainder(self.dim).expand(batch).reshape(-1)
+        if rows.requires_grad:
+            # The gradient of a window below would be built on all d windows of each row.
+            return rows.gather(-1, (starts[:, None] + torch.arange(self.dim, device=x.device)) % self.dim).reshape(
+                *batch, self.dim
+            )
         # A rotation is a window of the vector written twice: copying whole windows beats gathering elements.
         windows = torch.cat([rows, rows], -1).unfold(-1, self.dim, 1)
         return windows[torch.arange(len(rows), device=x.device), starts].reshape(*batch, self.dim)
@@ -106,9 +111,9 @@ class VSA(ABC):
     ) -> Shaped[Tensor, "*batch d"]:
         """Sum `k` hypervectors over dimension `dim` into a raw accumulator.
 
-        `weights` holds one number per summand (`[k]`, or one for each batch element too: the shape of `xs`
-        up to and including `dim`). Integer codes with integer weights stay exact. Raises `ShapeError` if `dim` is the
-        hypervector dimension.
+        `weights` holds one number per summand: `[k]`, or `[*batch, k]` for one in each batch element too. Integer
+        codes with integer weights stay exact. Raises `ShapeError` if `dim` is the hypervector dimension, or if the
+        weights do not fit.
         """
         self.check(xs, "xs")
         if xs.dim() < 2 or dim in (-1, xs.dim() - 1):
@@ -118,6 +123,11 @@ class VSA(ABC):
             )
         votes = signed(xs)
         if weights is not None:
+            if weights.dim() == 0 or weights.shape[-1] != xs.shape[dim]:
+                raise ShapeError(
+                    f"weights must hold one number for each of {xs.shape[dim]} summands; got shape "
+                    f"{tuple(weights.shape)}"
+                )
             if weights.is_floating_point() and is_integer(votes):
                 votes = votes.to(weights.dtype)
             elif is_integer(votes):

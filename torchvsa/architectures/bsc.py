@@ -39,6 +39,8 @@ class BSC(VSA):
 
     def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """XOR; with a raw accumulator, its votes are negated where the other's bit is set."""
+        self.check(a, "a")
+        self.check(b, "b")
         if a.dtype == torch.bool and b.dtype == torch.bool:
             return a ^ b
         return signed(a) * signed(b)

@@ -7,7 +7,7 @@ from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide
+from torchvsa.exact import divide, root
 
 
 class FHRR(VSA):
@@ -40,10 +40,14 @@ class FHRR(VSA):
 
     def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The element-wise complex product."""
+        self.check(a, "a")
+        self.check(b, "b")
         return a * b
 
     def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The product with the conjugate: exact for keys of length-1 elements."""
+        self.check(bound, "bound")
+        self.check(key, "key")
         return bound * key.conj()
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
@@ -58,4 +62,4 @@ class FHRR(VSA):
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `|key|² · |program|²`: one product for the whole batch."""
-        return (keys.abs() ** 2 @ (program.abs() ** 2)).to(torch.float64).sqrt()
+        return root(keys.abs() ** 2 @ (program.abs() ** 2))

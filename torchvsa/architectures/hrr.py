@@ -40,10 +40,14 @@ class HRR(VSA):
 
     def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Circular convolution, by way of the Fourier transform."""
+        self.check(a, "a")
+        self.check(b, "b")
         return torch.fft.irfft(torch.fft.rfft(a) * torch.fft.rfft(b), n=self.dim)
 
     def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Circular correlation: convolution with the key's approximate inverse."""
+        self.check(bound, "bound")
+        self.check(key, "key")
         return torch.fft.irfft(torch.fft.rfft(bound) * torch.fft.rfft(key).conj(), n=self.dim)
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:

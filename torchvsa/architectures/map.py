@@ -9,7 +9,7 @@ from torch import Tensor
 from torchvsa.architectures.base import VSA
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.ties import first_two
-from torchvsa.exact import dots, is_integer
+from torchvsa.exact import dots, is_integer, root
 
 
 class MAP(VSA):
@@ -69,10 +69,14 @@ class MAP(VSA):
 
     def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The element-wise product; its own inverse on -1 / +1."""
+        self.check(a, "a")
+        self.check(b, "b")
         return a * b
 
     def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The element-wise product again: exact for keys of -1 / +1."""
+        self.check(bound, "bound")
+        self.check(key, "key")
         return bound * key
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
@@ -116,4 +120,4 @@ class MAP(VSA):
         """The root of `key² · program²`: one product for the whole batch."""
         wide = torch.float64 if is_integer(program) else program.dtype
         squares = dots(keys.to(wide) ** 2, program.to(wide)[None] ** 2)[..., 0]
-        return squares.to(torch.float64).sqrt()
+        return root(squares)

@@ -4,8 +4,6 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
-from torchvsa.errors import ShapeError
-
 
 def first_two(
     xs: Shaped[Tensor, "*batch k d"], dim: int, weights: Shaped[Tensor, "..."] | None
@@ -20,8 +18,6 @@ def first_two(
         return None
     if weights is None:
         return xs[..., 0, :], xs[..., 1, :]
-    if weights.shape[-1] != xs.shape[-2]:
-        raise ShapeError(f"weights must hold one number for each of {xs.shape[-2]} voters; got {tuple(weights.shape)}")
     silent = (weights == 0).to(torch.int8).expand(xs.shape[:-1])
     order = silent.argsort(dim=-1, stable=True)[..., :2, None].expand(*xs.shape[:-2], 2, xs.shape[-1])
     pair = xs.gather(-2, order)

@@ -1,8 +1,8 @@
 """How the role-bound values of one record become one hypervector.
 
-A combination is a small class with two jobs: `prepare` turns the table of role-bound values `[n, V, d]` into
-the table it reads, one further entry at index V included for a value that was not observed; `join` combines
-the entries `[B, n, d]` of each record.
+A combination is a small class with three jobs: `bound` makes the table of role-bound values `[n, V, d]`;
+`unobserved` gives the entry that stands, at index V, for a value that was not observed; `join` combines the
+entries `[B, n, d]` of each record.
 """
 
 from abc import ABC, abstractmethod
@@ -66,7 +66,9 @@ class Bound(Combination):
     """The product of the role-bound values. Its kernel **multiplies** the kernels of the values.
 
     Binding commutes, so a product of roles and shared values would not say which sensor had which value;
-    the i-th role-bound value is therefore permuted i times.
+    the i-th role-bound value is therefore permuted i times. Where binding does not act element by element a
+    rotation can be moved out of the product (circular convolution commutes with it), so that the elements of each
+    sensor but the first take a random order instead.
     """
 
     name = "bind"
@@ -77,8 +79,13 @@ class Bound(Combination):
         values: Shaped[Tensor, "levels d"],
         generator: torch.Generator | None,
     ) -> Shaped[Tensor, "n levels d"]:
-        """The role-bound values, those of sensor i permuted i times."""
+        """The role-bound values, those of each sensor permuted in its own way."""
         table = super().bound(roles, values, generator)
+        if not self.vsa.elementwise:
+            orders = [torch.randperm(self.vsa.dim, generator=generator).to(table.device) for _ in roles[1:]]
+            return torch.stack(
+                [table[0], *(entries[:, order] for entries, order in zip(table[1:], orders, strict=True))]
+            )
         return self.vsa.permute(table, torch.arange(len(roles), device=roles.device)[:, None])
 
     def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:

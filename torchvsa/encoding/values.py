@@ -23,8 +23,9 @@ def level(
     """Level codes: similarity falls linearly with the distance, 1 - |i - j| / span, and is about 0 from `span` on.
 
     Every `span` levels stands an independent random hypervector; between two of them, elements change
-    over one by one in random order. By default the span is the whole range, which makes the two ends
-    independent. `span=1` is the lookup table.
+    over one by one, always in the same random order (with an order for each stretch, codes `span` apart would
+    still share up to a quarter of their elements). By default the span is the whole range, which makes the two
+    ends independent. `span=1` is the lookup table.
 
     Source: Rachkovskij et al. 2005; Kleyko et al. 2018 for the linear kernel.
     """
@@ -33,15 +34,15 @@ def level(
         raise ValueError(f"span counts the levels over which similarity falls to 0, at least 1; got {span}")
     segments = -(-(levels - 1) // span) if levels > 1 else 0
     anchors = vsa.random(segments + 1, generator=generator)
-    orders = [torch.randperm(vsa.dim, generator=generator) for _ in range(segments)]
+    order = torch.randperm(vsa.dim, generator=generator)
     codes = []
     for index in range(levels):
         segment, step = divmod(index, span)
         if step == 0:
             codes.append(anchors[segment])
         else:
-            # Integer comparison: exactly round-down(d · step / span) elements have changed over.
-            changed = orders[segment] * span < vsa.dim * step
+            # Integer comparison: exactly d · step / span, rounded up, elements have changed over.
+            changed = order * span < vsa.dim * step
             codes.append(torch.where(changed.to(anchors.device), anchors[segment + 1], anchors[segment]))
     return torch.stack(codes)
 

@@ -1,6 +1,7 @@
 """Clean-up memory: the known item that a noisy hypervector resembles most."""
 
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any, NamedTuple, Self
 
 import torch
 from jaxtyping import Float, Int, Shaped
@@ -50,7 +51,17 @@ class CleanUp(nn.Module):
         if items.dim() != 2 or len(items) == 0:
             raise ShapeError(f"a clean-up memory needs items [K, d] with K at least 1; got shape {tuple(items.shape)}")
         self.register_buffer("items", items)
-        self.register_buffer("lengths", norms(items), persistent=False)
+        self.lengths = norms(items)
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
+        # The lengths follow the items wherever they go, but stay in float64 whatever type the items take.
+        super()._apply(fn, recurse)
+        self.lengths = norms(self.items)
+        return self
+
+    def _load_from_state_dict(self, *args: Any, **kwargs: Any) -> None:
+        super()._load_from_state_dict(*args, **kwargs)
+        self.lengths = norms(self.items)
 
     def forward(self, queries: Shaped[Tensor, "*batch d"]) -> Match:
         """The index, similarity and margin of the best item for each query."""

@@ -1,0 +1,47 @@
+"""The interface of policies that combine behaviours."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor, nn
+
+from behaviours.bank import BehaviourBank
+from behaviours.recall import Recall
+
+
+class Policy(nn.Module, ABC):
+    """Several behaviours of one bank as one: readings `[B, n]` in, a `Recall` with `speaker` out.
+
+    `names` says which behaviours take part; `Recall.speaker` counts within it. A new policy implements
+    `ask` and is listed in `behaviours.composition.POLICIES`.
+    """
+
+    def __init__(self, bank: BehaviourBank, names: list[str]) -> None:
+        super().__init__()
+        if not names:
+            raise ValueError("a policy needs at least one behaviour to combine; the list of names is empty")
+        for name in names:
+            bank[name]
+        self.bank = bank
+        self.space = bank.space
+        self.names = names
+
+    def forward(self, readings: Any) -> Recall:
+        """Commands for readings; NaN commands and speaker -1 where no sensor was observed."""
+        bins = self.space.bins(readings)
+        return self.ask(self.space.encode(bins)).blank((bins < 0).all(-1))
+
+    @abstractmethod
+    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+        """Answer conditions that are encoded and protected already."""
+
+    def per_behaviour(self, given: Mapping[str, float] | None, otherwise: list[float], what: str) -> Tensor:
+        """One float64 number per behaviour from a mapping of names, which may name only those that take part."""
+        given = given or {}
+        if unknown := set(given) - set(self.names):
+            raise ValueError(f"{what} names {', '.join(sorted(unknown))}; the behaviours are {', '.join(self.names)}")
+        numbers = [float(given.get(name, default)) for name, default in zip(self.names, otherwise, strict=True)]
+        return torch.tensor(numbers, dtype=torch.float64)

@@ -1,0 +1,54 @@
+"""A demonstration as a learning rule sees it: distinct conditions, distinct results, and who met whom."""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Int64, Shaped
+from torch import Tensor
+
+from behaviours.demonstrations import Demonstrations
+from behaviours.space import Space
+
+
+@dataclass(frozen=True)
+class Samples:
+    """N samples over k distinct conditions and r distinct results, both in order of first appearance."""
+
+    conditions: Shaped[Tensor, "k d"]
+    """The protected conditions."""
+    results: Int64[Tensor, "r m"]
+    """The results, as levels of the actuators."""
+    condition: Int64[Tensor, "N"]
+    """Which condition each sample has."""
+    result: Int64[Tensor, "N"]
+    """Which result each sample has."""
+
+    @classmethod
+    def of(cls, space: Space, demonstrations: Demonstrations) -> "Samples":
+        """Check, quantise and encode a demonstration.
+
+        Conditions are the same if their hypervectors are: rows of equal bins are found first, and only one
+        of each is encoded. Raises if a row has no observed sensor.
+        """
+        bins = space.bins(demonstrations.sensors)
+        blind = (bins < 0).all(-1)
+        if blind.any():
+            raise ValueError(f"row {int(blind.nonzero()[0])} of the demonstration has no observed sensor")
+        levels = space.schema.command_levels(demonstrations.commands).to(bins.device)
+        distinct_bins, condition = distinct_rows(bins)
+        encoded, merged = distinct_rows(space.encode(distinct_bins))
+        distinct_results, result = distinct_rows(levels)
+        return cls(encoded, distinct_results, merged[condition], result)
+
+
+def distinct_rows(rows: Shaped[Tensor, "N c"]) -> tuple[Shaped[Tensor, "k c"], Int64[Tensor, "N"]]:
+    """The distinct rows in order of first appearance, and for each row which of them it is."""
+    comparable = torch.view_as_real(rows).flatten(1) if rows.is_complex() else rows
+    _, inverse = comparable.unique(dim=0, return_inverse=True)
+    count = int(inverse.max()) + 1
+    first = torch.full((count,), len(rows), device=rows.device)
+    first = first.scatter_reduce(0, inverse, torch.arange(len(rows), device=rows.device), "amin")
+    order = first.argsort()
+    rank = torch.empty_like(order)
+    rank[order] = torch.arange(count, device=rows.device)
+    return rows[first[order]], rank[inverse]

@@ -1,0 +1,50 @@
+"""What a behaviour answers, and the linear algebra by which it finds the answer."""
+
+from typing import Any, NamedTuple
+
+import torch
+from jaxtyping import Float, Float64, Int64, Shaped
+from torch import Tensor
+
+from torchvsa import VSA
+from torchvsa.exact import divide, dots
+
+
+class Recall(NamedTuple):
+    """The answer to a batch of readings. Never a silent guess: it says how sure it is."""
+
+    commands: Float64[Tensor, "batch m"]
+    """One command per actuator; NaN where no sensor was observed."""
+    similarity: Float[Tensor, "batch"]
+    """Cosine of the noisy result with the stored result that won."""
+    margin: Float[Tensor, "batch"]
+    """How far the runner-up lies below; inf if only one result is known."""
+    familiarity: Float[Tensor, "batch"]
+    """Cosine of the condition with the sum of the known conditions."""
+    speaker: Int64[Tensor, "batch"] | None = None
+    """Which behaviour answered: its position in the policy's list of names (policies only)."""
+
+    def blank(self, rows: Any) -> "Recall":
+        """Answer nothing in the given rows: NaN commands; similarity, margin and familiarity 0; speaker -1."""
+        return Recall(
+            self.commands.masked_fill(rows[:, None], torch.nan),
+            self.similarity.masked_fill(rows, 0.0),
+            self.margin.masked_fill(rows, 0.0),
+            self.familiarity.masked_fill(rows, 0.0),
+            None if self.speaker is None else self.speaker.masked_fill(rows, -1),
+        )
+
+
+def scores(
+    vsa: VSA,
+    program: Shaped[Tensor, "d"],
+    conditions: Shaped[Tensor, "batch d"],
+    items: Shaped[Tensor, "k d"],
+    lengths: Float64[Tensor, "k"],
+) -> Float64[Tensor, "batch k"]:
+    """How strongly the program answers each condition with each item: `<unbind(program, c), item> / |item|`.
+
+    Recall is linear until the clean-up, `<c ⊗ p, item> = <c, p ⊗ item>`, so the program is folded into the
+    items and a batch of queries is one matrix product.
+    """
+    return divide(dots(conditions, vsa.unbind(program, items)).to(torch.float64), lengths)

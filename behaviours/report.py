@@ -1,0 +1,36 @@
+"""What a learning rule did with a demonstration."""
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class LearningReport:
+    """Counts of the samples of one demonstration, by what the rule decided about them."""
+
+    rule: str
+    samples: int
+    new: int
+    """Samples whose condition was stored for the first time."""
+    truly_known: int = 0
+    """Samples taken as known whose condition was stored before."""
+    falsely_known: int = 0
+    """Samples taken as known although their condition was never stored: lost to the program."""
+    re_added: int = 0
+    """Samples stored once more, since the memory had forgotten their condition."""
+    contradicting: int = 0
+    """Samples whose condition was stored before with another result."""
+    passes: int = 1
+    """How often the rule went through the pairs."""
+    updates: int = 0
+    """How often a trained program was corrected."""
+    wrong: int = 0
+    """Pairs that a trained program still recalls wrongly, or below the margin asked for."""
+
+    @property
+    def pairs(self) -> int:
+        """Pairs of condition and result added to the program, repetitions included."""
+        return self.new + self.re_added
+
+    def to_dict(self) -> dict[str, str | int]:
+        """Plain values, for a file."""
+        return asdict(self)

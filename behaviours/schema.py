@@ -1,0 +1,147 @@
+"""What a robot senses and does: names, ranges and units."""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+import torch
+from jaxtyping import Float64, Int64
+from torch import Tensor
+
+from torchvsa import ShapeError
+
+
+def _check_range(kind: str, name: str, low: float, high: float) -> None:
+    if not name:
+        raise ValueError(f"every {kind} needs a name")
+    if not (np.isfinite(low) and np.isfinite(high) and low < high):
+        raise ValueError(f"{kind} {name!r} needs a finite range with low < high; got [{low}, {high}]")
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """A real-valued sensor with readings in `[low, high]`; NaN means that it was not observed.
+
+    `beyond` says what becomes of a reading outside the range: an error, or the nearest bound.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+    beyond: Literal["error", "clip"] = "error"
+
+    def __post_init__(self) -> None:
+        _check_range("sensor", self.name, self.low, self.high)
+        if self.beyond not in ("error", "clip"):
+            raise ValueError(f"sensor {self.name!r}: beyond is 'error' or 'clip'; got {self.beyond!r}")
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """A motor with commands in `[low, high]`, told apart at `levels` evenly spaced values, both ends among them."""
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+    levels: int = 21
+
+    def __post_init__(self) -> None:
+        _check_range("actuator", self.name, self.low, self.high)
+        if self.levels < 2:
+            raise ValueError(f"actuator {self.name!r} needs at least 2 levels; got {self.levels}")
+
+
+@dataclass(frozen=True)
+class Schema:
+    """The sensors and actuators of a robot, in the order of the columns of its data."""
+
+    sensors: Sequence[Sensor]
+    actuators: Sequence[Actuator]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sensors", tuple(self.sensors))
+        object.__setattr__(self, "actuators", tuple(self.actuators))
+        for kind, parts in (("sensor", self.sensors), ("actuator", self.actuators)):
+            names = [part.name for part in parts]
+            if not names:
+                raise ValueError(f"a schema needs at least one {kind}")
+            if len(set(names)) < len(names):
+                raise ValueError(f"{kind} names must differ; got {', '.join(names)}")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for a file."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> "Schema":
+        """The inverse of `to_dict`."""
+        return cls([Sensor(**s) for s in data["sensors"]], [Actuator(**a) for a in data["actuators"]])
+
+    def sensor_bins(self, readings: Any, bins: int) -> Int64[Tensor, "batch n"]:
+        """The bin of each reading: `bins` of equal width over each sensor's range, -1 for NaN (not observed).
+
+        Bin `b` holds `low + width · b <= reading < low + width · (b + 1)`; `high` itself lies in the last.
+        Raises an error that names sensor, row and range for infinite readings and those out of range.
+        """
+        rows = self.check_readings(readings)
+        low, high = self._bounds(self.sensors, rows.device)
+        index = ((rows - low) * bins / (high - low)).floor().clamp(0, bins - 1)
+        return torch.where(rows.isnan(), -1, index.nan_to_num(0.0)).to(torch.int64)
+
+    def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
+        """Readings as float64 rows, clipped where a sensor says so; raises if any is not valid."""
+        rows = _rows(readings, len(self.sensors), "sensor readings", [s.name for s in self.sensors])
+        low, high = self._bounds(self.sensors, rows.device)
+        outside = (rows < low) | (rows > high)  # False for NaN
+        strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
+        wrong = rows.isinf() | (outside & strict)
+        if wrong.any():
+            row, column = wrong.nonzero()[0].tolist()
+            sensor = self.sensors[column]
+            value = rows[row, column].item()
+            raise ValueError(
+                f"sensor {sensor.name!r} reads {value:g} in row {row}; its range is [{sensor.low:g}, {sensor.high:g}]"
+                f"{' ' + sensor.unit if sensor.unit else ''}"
+                + ("" if np.isinf(value) else " (declare it with beyond='clip' to accept the nearest bound)")
+            )
+        return torch.minimum(torch.maximum(rows, low), high)
+
+    def command_levels(self, commands: Any) -> Int64[Tensor, "batch m"]:
+        """The nearest level of each command (halves up). Raises, naming actuator and row, if one is not in range."""
+        rows = _rows(commands, len(self.actuators), "commands", [a.name for a in self.actuators])
+        low, high = self._bounds(self.actuators, rows.device)
+        wrong = ~((rows >= low) & (rows <= high))
+        if wrong.any():
+            row, column = wrong.nonzero()[0].tolist()
+            actuator = self.actuators[column]
+            raise ValueError(
+                f"actuator {actuator.name!r} is told {rows[row, column].item():g} in row {row}; "
+                f"its range is [{actuator.low:g}, {actuator.high:g}]{' ' + actuator.unit if actuator.unit else ''}"
+            )
+        steps = torch.tensor([a.levels - 1 for a in self.actuators], dtype=torch.float64, device=rows.device)
+        return ((rows - low) / (high - low) * steps + 0.5).floor().to(torch.int64)
+
+    def command_values(self, levels: Int64[Tensor, "batch m"]) -> Float64[Tensor, "batch m"]:
+        """The command that each level stands for."""
+        low, high = self._bounds(self.actuators, levels.device)
+        steps = torch.tensor([a.levels - 1 for a in self.actuators], dtype=torch.float64, device=levels.device)
+        return low + (high - low) * levels.to(torch.float64) / steps
+
+    @staticmethod
+    def _bounds(parts: Sequence[Sensor] | Sequence[Actuator], device: torch.device) -> tuple[Tensor, Tensor]:
+        low = torch.tensor([part.low for part in parts], dtype=torch.float64, device=device)
+        high = torch.tensor([part.high for part in parts], dtype=torch.float64, device=device)
+        return low, high
+
+
+def _rows(values: Any, columns: int, what: str, names: list[str]) -> Float64[Tensor, "batch columns"]:
+    rows = torch.as_tensor(values, dtype=torch.float64)
+    if rows.dim() != 2 or rows.shape[1] != columns:
+        raise ShapeError(
+            f"{what} must be rows of {columns} values ({', '.join(names)}), shape [batch, {columns}]; "
+            f"got shape {tuple(rows.shape)}"
+        )
+    return rows
