@@ -51,13 +51,13 @@ class Space(nn.Module):
         most = max(actuator.levels for actuator in schema.actuators)
         self.results = Record(vsa, len(schema.actuators), most, generator=generator)
         if not isinstance(protection, Protection):
-            options = {"name": protection} if isinstance(protection, str) else dict(protection)
-            name = options.pop("name")
+            given: dict[str, Any] = {"name": protection} if isinstance(protection, str) else dict(protection)
+            name = given.pop("name")
             if name not in PROTECTIONS:
                 raise ValueError(f"there is no protection {name!r}; choose one of {', '.join(PROTECTIONS)}")
             if name == "self_shift":
-                options["h"] = vsa.random(generator=generator)
-            protection = PROTECTIONS[name](vsa, **options)
+                given["h"] = vsa.random(generator=generator)
+            protection = PROTECTIONS[name](vsa, **given)
         elif protection.vsa != vsa:
             raise ValueError(f"the protection works on {protection.vsa}, this space on {vsa}")
         self.protect = protection

@@ -23,8 +23,8 @@ class ErrorDriven(Rule):
     A pair is in order if its result scores higher than every other stored result, and than silence (score 0,
     the answer to a condition that was never met), by `margin` times the score that one stored pair gives
     itself. Otherwise the pair is added once more, and the rival result, if there is one, is taken away from
-    that condition. The reference to silence matters when programs are added: it makes a behaviour that knows one result only
-    speak up as clearly as the others.
+    that condition. The reference to silence matters when programs are added: it makes a behaviour that knows
+    one result only speak up as clearly as the others.
 
     The program stays one raw sum of d numbers; integers for integer codes.
 
