@@ -32,8 +32,8 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         wide = torch.promote_types(a.dtype, b.dtype)
         a, b = (torch.view_as_real(x.to(wide).resolve_conj()).flatten(-2) for x in (a, b))
         return a @ b.T
-    if a.dtype == torch.int8 and b.dtype == torch.int8 and a.device.type == "cpu":
-        # The int8 units of the CPU, summing in int32.
+    if a.dtype == torch.int8 and b.dtype == torch.int8 and a.device.type == "cpu" and a.shape[-1] > 1:
+        # The int8 units of the CPU, summing in int32 (they answer nonsense where d = 1).
         return torch.ops.aten._int_mm(a.reshape(-1, a.shape[-1]), b.T).reshape(*a.shape[:-1], len(b))
     if is_integer(a) or is_integer(b):
         # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.

@@ -134,6 +134,9 @@ class SelfShift(Protection):
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""
+        if y.numel() == 0:
+            # The Fourier transform refuses an empty batch.
+            return torch.zeros(y.shape[:-1], dtype=torch.int64, device=y.device)
         spectrum, reference = (torch.fft.fft(_floats(v)) for v in (y, self.h))
         return torch.fft.ifft(spectrum * reference.conj()).real.argmax(-1)
 

@@ -42,13 +42,20 @@ class HRR(VSA):
         """Circular convolution, by way of the Fourier transform."""
         self.check(a, "a")
         self.check(b, "b")
-        return torch.fft.irfft(torch.fft.rfft(a) * torch.fft.rfft(b), n=self.dim)
+        return self._convolve(a, b, conjugate=False)
 
     def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Circular correlation: convolution with the key's approximate inverse."""
         self.check(bound, "bound")
         self.check(key, "key")
-        return torch.fft.irfft(torch.fft.rfft(bound) * torch.fft.rfft(key).conj(), n=self.dim)
+        return self._convolve(bound, key, conjugate=True)
+
+    def _convolve(self, a: Tensor, b: Tensor, conjugate: bool) -> Tensor:
+        if a.numel() == 0 or b.numel() == 0:
+            # The Fourier transform refuses an empty batch; a product has its shape.
+            return a * b
+        spectrum = torch.fft.rfft(b)
+        return torch.fft.irfft(torch.fft.rfft(a) * (spectrum.conj() if conjugate else spectrum), n=self.dim)
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Scale to length 1; zero stays zero."""

@@ -1,0 +1,118 @@
+"""Errors name what was given and what was expected."""
+
+from collections.abc import Callable
+
+import pytest
+import torch
+
+import torchvsa
+from torchvsa import CleanUp, Record, SelfShift, ShapeError
+from torchvsa.encoding import level
+
+SMALL = torchvsa.MAP(16)
+ROW = torch.zeros(3, dtype=torch.long)
+
+REFUSED: dict[str, tuple[Callable[[], object], type[ValueError], list[str]]] = {
+    "an unknown architecture": (lambda: torchvsa.architecture("MAP", 8), ValueError, ["'MAP'", "MAP-C", "BSC"]),
+    "an unknown type": (lambda: torchvsa.architecture("HRR", 8, "float31"), ValueError, ["'float31'", "int8"]),
+    "no type at all": (lambda: torchvsa.architecture("HRR", 8, "nn"), ValueError, ["'nn'", "float32"]),
+    "no dimensions": (lambda: torchvsa.MAP(0), ValueError, ["dim", "positive", "0"]),
+    "half a dimension": (lambda: torchvsa.MAP(1.5), ValueError, ["dim", "1.5"]),  # pyright: ignore[reportArgumentType]
+    "a truth as dimension": (lambda: torchvsa.MAP(True), ValueError, ["dim", "True"]),
+    "an unknown variant": (
+        lambda: torchvsa.MAP(8, "D"),  # pyright: ignore[reportArgumentType]
+        ValueError,
+        ["'D'", "'C', 'B' and 'I'"],
+    ),
+    "MAP of bits": (lambda: torchvsa.MAP(8, dtype=torch.bool), ValueError, ["torch.bool", "float32", "int8"]),
+    "uniform codes": (lambda: torchvsa.MAP(8, dtype=torch.int8, atoms="uniform"), ValueError, ["uniform", "int8"]),
+    "uniform MAP-B": (lambda: torchvsa.MAP(8, "B", atoms="uniform"), ValueError, ["uniform", "'B'", "'C'"]),
+    "unknown atoms": (
+        lambda: torchvsa.MAP(8, atoms="normal"),  # pyright: ignore[reportArgumentType]
+        ValueError,
+        ["'normal'", "'bipolar'", "'uniform'"],
+    ),
+    "integer HRR": (lambda: torchvsa.HRR(8, torch.int8), ValueError, ["HRR", "float32", "torch.int8"]),
+    "real FHRR": (lambda: torchvsa.FHRR(8, torch.float32), ValueError, ["FHRR", "complex64", "torch.float32"]),
+    "real BSC": (lambda: torchvsa.BSC(8, torch.float32), ValueError, ["BSC", "torch.bool", "torch.float32"]),
+    "one vector to bundle": (lambda: SMALL.bundle(torch.ones(16)), ShapeError, ["(16,)", "[..., k, 16]"]),
+    "elements to bundle": (lambda: SMALL.bundle(torch.ones(3, 16), dim=-1), ShapeError, ["dim=-1", "(3, 16)"]),
+    "elements to bundle, counted": (lambda: SMALL.bundle(torch.ones(3, 16), dim=1), ShapeError, ["dim=1", "dim=-2"]),
+    "bundle of others": (lambda: SMALL.bundle(torch.ones(3, 8)), ShapeError, ["xs", "d = 16", "(3, 8)"]),
+    "too few weights": (
+        lambda: SMALL.bundle(torch.ones(3, 16), weights=torch.ones(2)),
+        ShapeError,
+        ["weights", "3", "(2,)"],
+    ),
+    "one weight for all": (
+        lambda: SMALL.bundle(torch.ones(3, 16), weights=torch.ones(1)),
+        ShapeError,
+        ["weights", "3", "(1,)"],
+    ),
+    "a bare weight": (
+        lambda: SMALL.bundle(torch.ones(3, 16), weights=torch.tensor(1)),
+        ShapeError,
+        ["weights", "3", "()"],
+    ),
+    "an unknown width": (
+        lambda: SelfShift(SMALL, "median"),  # pyright: ignore[reportArgumentType]
+        ValueError,
+        ["'mean'", "'sum'", "'median'"],
+    ),
+    "no span": (lambda: level(SMALL, 4, span=0), ValueError, ["span", "at least 1", "0"]),
+    "an unknown value encoder": (lambda: Record(SMALL, 2, 4, "thermo"), ValueError, ["'thermo'", "lookup", "level"]),
+    "an unknown combination": (
+        lambda: Record(SMALL, 2, 4, combine="sum"),
+        ValueError,
+        ["'sum'", "bundle", "bind", "subset"],
+    ),
+    "no sensors": (lambda: Record(SMALL, 0, 4), ValueError, ["at least one sensor", "0 and 4"]),
+    "no levels": (lambda: Record(SMALL, 2, 0), ValueError, ["one level", "2 and 0"]),
+    "an empty subset": (
+        lambda: Record(SMALL, 2, 4, combine="subset", subset=0),
+        ValueError,
+        ["subset", "at least 1", "0"],
+    ),
+    "a subset in HRR": (
+        lambda: Record(torchvsa.HRR(8), 2, 4, combine="subset"),
+        ValueError,
+        ["subset", "element-wise", "HRR"],
+    ),
+    "one row of indices": (lambda: Record(SMALL, 3, 4)(ROW), ShapeError, ["indices", "[batch, 3]", "(3,)"]),
+    "a missing sensor": (lambda: Record(SMALL, 2, 4)(ROW[None]), ShapeError, ["[batch, 2]", "(1, 3)"]),
+    "no items": (lambda: CleanUp(torch.ones(0, 4)), ShapeError, ["items", "at least 1", "(0, 4)"]),
+    "one bare item": (lambda: CleanUp(torch.ones(4)), ShapeError, ["[K, d]", "(4,)"]),
+    "another query": (
+        lambda: CleanUp(torch.ones(2, 4))(torch.ones(3, 5)),
+        ShapeError,
+        ["queries", "d = 4", "(3, 5)"],
+    ),
+    "a bare query": (lambda: CleanUp(torch.ones(2, 4))(torch.tensor(1.0)), ShapeError, ["queries", "d = 4", "()"]),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_the_message_names_what_was_given_and_what_was_expected(name: str) -> None:
+    call, kind, words = REFUSED[name]
+    with pytest.raises(kind) as refused:
+        call()
+    for word in words:
+        assert word in str(refused.value)
+
+
+@pytest.mark.parametrize("verb", ["bind", "unbind", "similarity"])
+@pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
+def test_no_architecture_takes_vectors_of_another_dimension(name: str, verb: str) -> None:
+    vsa, other = torchvsa.architecture(name, 16), torchvsa.architecture(name, 10)
+    right, wrong = vsa.random(2), other.random(2)
+    for pair in ((right, wrong), (wrong, right), (wrong, wrong), (right, right[:, :1])):
+        with pytest.raises(ShapeError, match=r"must end in d = 16 elements; got shape \(2, (10|1)\)"):
+            getattr(vsa, verb)(*pair)
+
+
+@pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
+def test_no_permutation_or_protection_takes_vectors_of_another_dimension(name: str) -> None:
+    vsa, wrong = torchvsa.architecture(name, 16), torchvsa.architecture(name, 10).random(2)
+    for call in (lambda: vsa.permute(wrong, 1), lambda: SelfShift(vsa)(wrong)):
+        with pytest.raises(ShapeError, match=r"x must end in d = 16 elements; got shape \(2, 10\)"):
+            call()
