@@ -86,6 +86,6 @@ class BehaviourBank(nn.Module):
             for name, report in about["behaviours"].items():
                 parts = (tensors[f"behaviours.{name}.{key}"] for key in ("program", "known", "results"))
                 bank.add(name, Behaviour(space, *parts, report=LearningReport(**report)))
-        except (KeyError, TypeError, RuntimeError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
             raise ValueError(f"{path} does not describe a bank of this version: {error}") from error
         return bank

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from behaviours.recall import Recall, scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
-from torchvsa import CleanUp
+from torchvsa import CleanUp, ShapeError
 from torchvsa.exact import norms
 from torchvsa.memory import best
 
@@ -37,6 +37,14 @@ class Behaviour(nn.Module):
         report: LearningReport,
     ) -> None:
         super().__init__()
+        for name, vector in (("program", program), ("known", known)):
+            if vector.shape != (space.vsa.dim,):
+                raise ShapeError(f"{name} must be one hypervector [{space.vsa.dim}]; got shape {tuple(vector.shape)}")
+        if results.dim() != 2 or results.shape[1] != len(space.schema.actuators):
+            raise ShapeError(
+                f"results must be rows of one level per actuator, [k, {len(space.schema.actuators)}]; "
+                f"got shape {tuple(results.shape)}"
+            )
         self.space = space
         self.report = report
         self.register_buffer("program", program)

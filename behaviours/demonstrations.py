@@ -32,6 +32,8 @@ class Demonstrations:
         if episodes is None:
             episodes = torch.zeros(count)
         self.episodes: Int64[Tensor, "N"] = torch.as_tensor(episodes).to(torch.int64)
+        if self.episodes.dim() != 1:
+            raise ShapeError(f"episodes must be one number per row, [N]; got shape {tuple(self.episodes.shape)}")
         for name, rows in (("commands", self.commands), ("episodes", self.episodes)):
             if len(rows) != count:
                 raise ShapeError(f"{name} has {len(rows)} rows, but sensors has {count}; each row is one moment")
@@ -76,4 +78,7 @@ class Demonstrations:
     def load(cls, path: str | Path) -> "Demonstrations":
         """Read what `save` wrote."""
         tensors, _ = load_tensors(path, "demonstrations")
-        return cls(tensors["sensors"], tensors["commands"], tensors["episodes"])
+        try:
+            return cls(tensors["sensors"], tensors["commands"], tensors["episodes"])
+        except (KeyError, ValueError) as error:
+            raise ValueError(f"{path} does not hold demonstrations of this version: {error}") from error

@@ -138,7 +138,8 @@ class Schema:
 
 
 def _rows(values: Any, columns: int, what: str, names: list[str]) -> Float64[Tensor, "batch columns"]:
-    rows = torch.as_tensor(values, dtype=torch.float64)
+    # Copied, so that a read-only array is accepted without a warning.
+    rows = torch.as_tensor(np.array(values) if isinstance(values, np.ndarray) else values, dtype=torch.float64)
     if rows.dim() != 2 or rows.shape[1] != columns:
         raise ShapeError(
             f"{what} must be rows of {columns} values ({', '.join(names)}), shape [batch, {columns}]; "

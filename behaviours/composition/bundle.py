@@ -1,6 +1,7 @@
 """Bundling: the weighted sum of the programs is a program."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import reduce
 
 import torch
 from jaxtyping import Shaped
@@ -12,7 +13,7 @@ from behaviours.composition.base import Policy
 from behaviours.learning.samples import distinct_rows
 from behaviours.recall import Recall, scores
 from behaviours.report import LearningReport
-from torchvsa.exact import norms
+from torchvsa.exact import norms, signed
 
 
 class Bundle(Policy):
@@ -35,8 +36,8 @@ class Bundle(Policy):
         whole = bool((numbers == numbers.round()).all())
         self.weights = [int(w) if whole else float(w) for w in numbers.tolist()]
         parts = [bank[name] for name in self.names]
-        self.register_buffer("program", _weighted_sum(self.weights, [b.program for b in parts]))
-        self.register_buffer("known", _weighted_sum([1] * len(parts), [b.known for b in parts]))
+        self.register_buffer("program", self._weighted_sum(self.weights, [b.program for b in parts]))
+        self.register_buffer("known", self._weighted_sum([1] * len(parts), [b.known for b in parts]))
         self.register_buffer("results", distinct_rows(torch.cat([b.results for b in parts]))[0])
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
@@ -48,7 +49,8 @@ class Bundle(Policy):
             for name, weight in zip(self.names, self.weights, strict=True)
         ]
         recall = answer(self.space, self.program, self.known, self.results, conditions)
-        winner = torch.stack(shares).sum(0).argmax(-1)
+        # The sum of the shares rounds differently, which could name another winner where results are tied.
+        winner = scores(self.space.vsa, self.program, conditions, items, lengths).argmax(-1)
         speaker = torch.stack([share.gather(-1, winner[:, None])[:, 0] for share in shares]).argmax(0)
         return recall._replace(speaker=speaker)
 
@@ -58,8 +60,9 @@ class Bundle(Policy):
         report = LearningReport("bundle", sum(r.samples for r in reports), sum(r.new for r in reports))
         return Behaviour(self.space, self.program, self.known, self.results, report)
 
-
-def _weighted_sum(weights: list[int] | list[float] | list[int | float], vectors: list[Tensor]) -> Tensor:
-    return torch.stack([weight * vector for weight, vector in zip(weights, vectors, strict=True)]).sum(
-        0, dtype=torch.result_type(vectors[0], weights[0])
-    )
+    def _weighted_sum(self, weights: Sequence[float], vectors: list[Tensor]) -> Tensor:
+        # Raw and clipped programs (smaller types, bits that stand for votes) may stand side by side.
+        votes = [signed(vector) for vector in vectors]
+        wide = reduce(torch.promote_types, (vote.dtype for vote in votes))
+        rows = torch.stack([vote.to(wide) for vote in votes])
+        return self.space.vsa.superpose(rows, weights=torch.tensor(weights, device=rows.device))

@@ -93,23 +93,28 @@ class ErrorDriven(Rule):
         unit = torch.cat([norms(vsa.bind(c, items[t])) ** 2 for c, t in _blocks(conditions, targets)])
         wanted = self.margin * unit / lengths[targets]
         program = torch.zeros(vsa.dim, dtype=vsa.accumulator, device=items.device)
-        updates = corrected = 0
+        updates = 0
+
+        def judge(start: int) -> tuple[Tensor, Tensor, Tensor]:
+            """Of the block of pairs from `start` on: which are out of order, their rivals, and the rivals' scores."""
+            rows = slice(start, start + _BLOCK)
+            answers = scores(vsa, program, conditions[rows], items, lengths)
+            aims = targets[rows, None]
+            rival_scores, rivals = answers.scatter(1, aims, -torch.inf).max(-1)
+            lead = answers.gather(1, aims)[:, 0] - rival_scores.clamp(min=0)
+            return (lead < wanted[rows]) | (lead <= 0), rivals, rival_scores
+
         for sweep in range(1, self.passes + 1):
             corrected = start = 0
             while start < len(conditions):
                 # Pairs up to the first one out of order leave the program as it is, so a block of them is
                 # asked at once; the block after a correction starts behind it.
-                rows = slice(start, start + _BLOCK)
-                answers = scores(vsa, program, conditions[rows], items, lengths)
-                aims = targets[rows, None]
-                rival_scores, rivals = answers.scatter(1, aims, -torch.inf).max(-1)
-                lead = answers.gather(1, aims)[:, 0] - rival_scores.clamp(min=0)
-                short = (lead < wanted[rows]) | (lead <= 0)
+                short, rivals, rival_scores = judge(start)
                 if not short.any():
                     start += _BLOCK
                     continue
                 at = int(short.to(torch.int8).argmax())
-                condition, aim, rival = conditions[start + at], int(aims[at]), int(rivals[at])
+                condition, aim, rival = conditions[start + at], int(targets[start + at]), int(rivals[at])
                 program = program + vsa.superpose(vsa.bind(condition, items[aim])[None])
                 if rival_scores[at] > 0:
                     program = program - vsa.superpose(vsa.bind(condition, items[rival])[None])
@@ -118,7 +123,9 @@ class ErrorDriven(Rule):
             updates += corrected
             if corrected == 0:
                 return program, sweep, updates, 0
-        return program, self.passes, updates, corrected
+        # Each correction changes the recall of all pairs, so what is left wrong is only known by asking again.
+        wrong = sum(int(judge(start)[0].sum()) for start in range(0, len(conditions), _BLOCK))
+        return program, self.passes, updates, wrong
 
 
 _BLOCK = 64

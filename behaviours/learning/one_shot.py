@@ -103,7 +103,8 @@ class _Sums:
             asked, is_known = seen.get(condition, (-1, False))
             if asked != version:
                 product = paired_dots(self.samples.conditions[condition], self.known)
-                is_known = bool(divide(product, known_length * lengths[condition]) > threshold)
+                # An empty memory resembles nothing, even where the threshold is negative.
+                is_known = version > 0 and bool(divide(product, known_length * lengths[condition]) > threshold)
                 seen[condition] = version, is_known
             if not is_known:
                 self.add(row)

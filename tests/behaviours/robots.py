@@ -1,0 +1,54 @@
+"""Small robots and random demonstrations for the tests."""
+
+from typing import Any
+
+import numpy as np
+import torch
+
+import torchvsa
+from behaviours import Actuator, Behaviour, Demonstrations, Encoder, Schema, Sensor, Space
+from torchvsa import VSA
+
+BINS = 20
+LEVELS = 3
+
+SCHEMA = Schema(
+    [Sensor(name, 0, BINS) for name in ("left", "right", "front")],
+    [Actuator(name, -1, 1, levels=LEVELS) for name in ("left_motor", "right_motor")],
+)
+"""3 sensors of 20 values and 9 results from 2 actuators of 3 values: the robot of DESIGN's numbers."""
+
+
+def space(
+    dim: int = 1024,
+    vsa: str | VSA = "MAP-C",
+    dtype: str | None = None,
+    protection: Any = "self_shift",
+    seed: int = 0,
+    **encoder: Any,
+) -> Space:
+    """Codebooks for `SCHEMA`; MAP in exact integer codes unless another type is asked for."""
+    if isinstance(vsa, str):
+        exact = "int8" if vsa.startswith("MAP") else None
+        vsa = torchvsa.architecture(vsa, dim, dtype or exact)
+    return Space(SCHEMA, vsa, Encoder(BINS, **encoder), protection, seed)
+
+
+def random_pairs(count: int, seed: int = 0) -> Demonstrations:
+    """Distinct random conditions with random results."""
+    rng = np.random.default_rng(seed)
+    cells = rng.choice(BINS**3, count, replace=False)
+    results = rng.integers(0, LEVELS**2, count)
+    sensors = np.stack(np.unravel_index(cells, (BINS,) * 3), 1) + 0.5
+    commands = np.stack(np.unravel_index(results, (LEVELS,) * 2), 1) - 1.0
+    return Demonstrations(sensors, commands)
+
+
+def correct(behaviour: Behaviour, demonstrations: Demonstrations) -> torch.Tensor:
+    """For each pair, 1.0 if its commands are recalled."""
+    return (behaviour(demonstrations.sensors).commands == demonstrations.commands).all(1).double()
+
+
+def same_bits(a: torch.Tensor, b: torch.Tensor) -> bool:
+    """Equal in type, shape and every bit (NaN equals itself)."""
+    return a.dtype == b.dtype and a.shape == b.shape and a.numpy().tobytes() == b.numpy().tobytes()
