@@ -67,8 +67,8 @@ class BehaviourBank(nn.Module):
         tensors = {f"space.{key}": value for key, value in self.space.state_dict().items()}
         for name in self:
             behaviour = self[name]
-            for key in ("program", "known", "results"):
-                tensors[f"behaviours.{name}.{key}"] = behaviour.get_buffer(key)
+            parts = {"program": behaviour.program, "known": behaviour.known, "results": behaviour.results}
+            tensors |= {f"behaviours.{name}.{key}": tensor for key, tensor in parts.items()}
         about = {
             "space": self.space.config(),
             "behaviours": {name: self[name].report.to_dict() for name in self},

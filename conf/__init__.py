@@ -1,0 +1,1 @@
+"""What Hydra reads; a package, so that an installed wheel carries it."""

@@ -1,0 +1,9 @@
+"""Reproducible studies, one file per question. The only place where robot and algebra meet."""
+
+try:
+    import hydra as _hydra
+    import pybullet as _pybullet
+except ImportError as error:
+    raise ImportError(f"{error.name} is missing; the experiments need: pip install 'torchvsa[corral]'") from error
+
+del _hydra, _pybullet

@@ -2,13 +2,14 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 import torch
 from jaxtyping import Shaped
 from torch import Tensor, nn
 
 from behaviours.bank import BehaviourBank
+from behaviours.behaviour import Behaviour
 from behaviours.recall import Recall
 
 
@@ -23,11 +24,15 @@ class Policy(nn.Module, ABC):
         super().__init__()
         if not names:
             raise ValueError("a policy needs at least one behaviour to combine; the list of names is empty")
-        for name in names:
-            bank[name]
-        self.bank = bank
         self.space = bank.space
         self.names = names
+        # The behaviours as they are now: what the bank learns later does not change the policy.
+        self._parts = nn.ModuleList([bank[name] for name in names])
+
+    @property
+    def parts(self) -> list[Behaviour]:
+        """The behaviours that take part, in the order of `names`."""
+        return cast(list[Behaviour], list(self._parts))
 
     def forward(self, readings: Any) -> Recall:
         """Commands for readings; NaN commands and speaker -1 where no sensor was observed."""

@@ -8,7 +8,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from behaviours.bank import BehaviourBank
-from behaviours.behaviour import Behaviour, answer
+from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
 from behaviours.learning.samples import distinct_rows
 from behaviours.recall import Recall, scores
@@ -26,39 +26,37 @@ class Bundle(Policy):
     `weights` default to 1 for every behaviour, in which case integer programs stay integers.
     """
 
-    program: Tensor
-    known: Tensor
-    results: Tensor
-
     def __init__(self, bank: BehaviourBank, weights: Mapping[str, float] | None = None) -> None:
         super().__init__(bank, bank.names)
         numbers = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
         whole = bool((numbers == numbers.round()).all())
         self.weights = [int(w) if whole else float(w) for w in numbers.tolist()]
-        parts = [bank[name] for name in self.names]
-        self.register_buffer("program", self._weighted_sum(self.weights, [b.program for b in parts]))
-        self.register_buffer("known", self._weighted_sum([1] * len(parts), [b.known for b in parts]))
-        self.register_buffer("results", distinct_rows(torch.cat([b.results for b in parts]))[0])
+        parts = self.parts
+        report = LearningReport("bundle", sum(p.report.samples for p in parts), sum(p.report.new for p in parts))
+        self.behaviour = Behaviour(
+            self.space,
+            self._weighted_sum(self.weights, [part.program for part in parts]),
+            self._weighted_sum([1] * len(parts), [part.known for part in parts]),
+            distinct_rows(torch.cat([part.results for part in parts]))[0],
+            report,
+        )
+        """The bundle as a behaviour of its own: the same form as each of its parts."""
+
+    @property
+    def program(self) -> Shaped[Tensor, "d"]:
+        """The weighted sum of the programs."""
+        return self.behaviour.program
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """See `Policy.ask`."""
-        items = self.space.results(self.results)
+        vsa, items = self.space.vsa, self.behaviour.memory.items
         lengths = norms(items)
+        winner = scores(vsa, self.behaviour.program, conditions, items, lengths).argmax(-1)
         shares = [
-            weight * scores(self.space.vsa, self.bank[name].program, conditions, items, lengths)
-            for name, weight in zip(self.names, self.weights, strict=True)
+            weight * scores(vsa, part.program, conditions, items, lengths).gather(-1, winner[:, None])[:, 0]
+            for part, weight in zip(self.parts, self.weights, strict=True)
         ]
-        recall = answer(self.space, self.program, self.known, self.results, conditions)
-        # The sum of the shares rounds differently, which could name another winner where results are tied.
-        winner = scores(self.space.vsa, self.program, conditions, items, lengths).argmax(-1)
-        speaker = torch.stack([share.gather(-1, winner[:, None])[:, 0] for share in shares]).argmax(0)
-        return recall._replace(speaker=speaker)
-
-    def behaviour(self) -> Behaviour:
-        """The bundle as a behaviour of its own: the same form as each of its parts."""
-        reports = [self.bank[name].report for name in self.names]
-        report = LearningReport("bundle", sum(r.samples for r in reports), sum(r.new for r in reports))
-        return Behaviour(self.space, self.program, self.known, self.results, report)
+        return self.behaviour.ask(conditions)._replace(speaker=torch.stack(shares).argmax(0))
 
     def _weighted_sum(self, weights: Sequence[float], vectors: list[Tensor]) -> Tensor:
         # Raw and clipped programs (smaller types, bits that stand for votes) may stand side by side.

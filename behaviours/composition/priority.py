@@ -27,12 +27,12 @@ class Priority(Policy):
         thresholds: Mapping[str, float] | None = None,
     ) -> None:
         super().__init__(bank, bank.names if order is None else list(order))
-        calibrated = [0.5 / max(bank[name].report.pairs, 1) ** 0.5 for name in self.names]
+        calibrated = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
         self.thresholds = self.per_behaviour(thresholds, calibrated, "thresholds").tolist()
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """See `Policy.ask`."""
-        answers = [self.bank[name].ask(conditions) for name in self.names]
+        answers = [part.ask(conditions) for part in self.parts]
         familiarity = torch.stack([recall.familiarity for recall in answers])
         knows = familiarity > torch.tensor(self.thresholds, device=familiarity.device)[:, None]
         speaker = torch.where(knows.any(0), knows.to(torch.int8).argmax(0), familiarity.argmax(0))

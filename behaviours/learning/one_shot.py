@@ -6,10 +6,11 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from behaviours.behaviour import Behaviour, in_order_of_appearance
+from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.samples import Samples
+from behaviours.memory import in_order_of_appearance
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa.exact import divide, norms, paired_dots

@@ -30,7 +30,7 @@ def test_a_loaded_state_answers_at_once(vsa: str) -> None:
 
 def test_the_state_is_all_there_is() -> None:
     behaviour = OneShot().fit(space(128), random_pairs(12))
-    assert {"program", "known", "results"} <= set(behaviour.state_dict())
+    assert {"program", "known", "memory.levels"} <= set(behaviour.state_dict())
     assert any(key.startswith("space.conditions.") for key in behaviour.state_dict())
 
 

@@ -65,7 +65,7 @@ def test_clipping_breaks_the_vote() -> None:
     bank, pairs = three(128)
     policy = Bundle(bank)
     conditions = bank.space.encode(bank.space.bins(everything(pairs)))
-    items = bank.space.results(policy.results)
+    items = bank.space.results(policy.behaviour.results)
 
     def votes(program: torch.Tensor) -> torch.Tensor:
         return dots(bank.space.vsa.unbind(program, conditions), items).to(torch.int64)
@@ -73,7 +73,7 @@ def test_clipping_breaks_the_vote() -> None:
     shares = sum(votes(bank[name].program) for name in NAMES)
     assert torch.equal(votes(policy.program), torch.as_tensor(shares))
     clipped = sum(votes(bank[name].clipped().program) for name in NAMES)
-    assert not torch.equal(votes(policy.behaviour().clipped().program), torch.as_tensor(clipped))
+    assert not torch.equal(votes(policy.behaviour.clipped().program), torch.as_tensor(clipped))
 
 
 @pytest.mark.parametrize("vsa", ARCHITECTURES)
@@ -86,7 +86,7 @@ def test_clipped_programs_are_bundled_as_the_votes_they_are(vsa: str) -> None:
     policy = Bundle(clipped, {"seek": 100, "avoid": 90})
     wanted = sum(w * wide(clipped[name].program) for w, name in zip([100, 90, 1], NAMES, strict=True))
     np.testing.assert_allclose(wide(policy.program), wanted, rtol=1e-5, atol=1e-4)
-    np.testing.assert_allclose(wide(policy.known), sum(wide(clipped[n].known) for n in NAMES), atol=1e-4)
+    np.testing.assert_allclose(wide(policy.behaviour.known), sum(wide(clipped[n].known) for n in NAMES), atol=1e-4)
     assert policy(pairs["seek"].sensors).commands.isfinite().all()
 
 
@@ -106,7 +106,7 @@ def test_a_bundle_recalls_all_of_its_parts_as_one_behaviour(vsa: str) -> None:
     for name in NAMES:
         recall = policy(pairs[name].sensors)
         assert recall.commands.tolist() == pairs[name].commands.tolist()
-    whole = policy.behaviour()
+    whole = policy.behaviour
     assert isinstance(whole, Behaviour)
     readings = everything(pairs)
     assert same_answer(whole(readings), policy(readings))
@@ -131,7 +131,7 @@ def test_the_speaker_contributes_most_to_the_winner(weights: list[int]) -> None:
     policy = Bundle(bank, dict(zip(NAMES, weights, strict=True)))
     readings = everything(pairs)
     recall = policy(readings)
-    items = wide(bank.space.results(policy.results)).real
+    items = wide(bank.space.results(policy.behaviour.results)).real
     programs = [w * wide(bank[name].program).real for w, name in zip(weights, NAMES, strict=True)]
     assert recall.speaker is not None
     for row, condition in enumerate(wide(bank.space.encode(bank.space.bins(readings))).real):

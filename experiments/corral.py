@@ -1,0 +1,291 @@
+"""The main job: show the corral escape, learn it as one hypervector, drive, and compare.
+
+The teacher (the paper's five if-else rules) drives a simulated robot with real-valued sensors. Its runs are the
+demonstrations. Each controller of the table learns from them or is a reference point, is asked about held-out runs
+of the teacher (agreement), and then drives by itself from held-out starts (success).
+
+    python -m experiments.corral
+    python -m experiments.corral --multirun vsa.dim=1000,4000 seed=0,1
+    python -m experiments.corral controllers=[teacher,default] encoder.bins=16
+"""
+
+import os
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, cast
+
+import hydra
+import numpy as np
+import torch
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+import sim
+from behaviours import Demonstrations
+from experiments import presets
+from experiments.agreement import Agreement, measure
+from experiments.controllers import CONTROLLERS, Controller, Study, check_names
+from experiments.results import Results, Row, finished
+
+FIRST_DEMONSTRATION = 1_000_000
+FIRST_VALIDATION = 2_000_000
+"""Held-out starts are the episodes 0, 1, ...; those to learn from and to choose settings with lie far away."""
+
+COLUMNS = (
+    "controller",
+    "episodes",
+    "success_rate",
+    "success_low",
+    "success_high",
+    "escape_rate",
+    "time_to_light_s",
+    "dwell_fraction",
+    "collision_fraction",
+    "train_agreement",
+    "heldout_agreement",
+    "unseen_agreement",
+    "pairs_stored",
+    "bins",
+    "query_us",
+)
+
+
+class Driver:
+    """Drives policies in the run's arena, on all workers, with a progress bar for each drive."""
+
+    def __init__(self, config: Mapping[str, Any], executor: Executor, progress: Progress) -> None:
+        self.config, self.executor, self.progress = config, executor, progress
+        self.arena = presets.arena(config["arena"])
+
+    def drive(
+        self, what: str, policy: sim.Policy, episodes: range, body: str | None = None, record: bool = False
+    ) -> sim.Rollout:
+        """Drive `policy` from the starts of `episodes`."""
+        task = self.progress.add_task(what, total=len(episodes))
+        return sim.rollout(
+            policy,
+            arena=self.arena,
+            body=body or self.config["body"]["name"],
+            episodes=episodes,
+            seed=self.config["seed"],
+            seconds=self.config["seconds"],
+            robots=self.config["robots"],
+            executor=self.executor,
+            workers=self.config["workers"],
+            record=record,
+            progress=lambda count: self.progress.advance(task, count),
+        )
+
+
+def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
+    """Run the whole comparison and write it to `folder`."""
+    began = time.perf_counter()
+    results = Results("corral", config, config["seed"])
+    check_names(config["controllers"])
+    # Settings that cannot be built are found before anything is driven.
+    reference = presets.space(config["vsa"], config, config["seed"])
+    presets.rule(config["rule"])
+    with _workers(config["workers"]) as executor, _progress(console) as progress:
+        driver = Driver(config, executor, progress)
+        numbers = range(FIRST_DEMONSTRATION, FIRST_DEMONSTRATION + config["demonstrations"])
+        shown = driver.drive("teacher demonstrates", sim.Teacher(), numbers, record=True)
+        train = Demonstrations(shown.trajectory.sensors, shown.trajectory.commands, shown.step_episode)
+        moving = train.where((~shown.trajectory.reached).tolist())
+        validation = range(FIRST_VALIDATION, FIRST_VALIDATION + config["validation_starts"])
+        learn_from = Study(
+            config,
+            train,
+            sim.Teacher().rule(train.sensors.numpy()),
+            validate=lambda policy: driver.drive("bins for paper_best_bins", policy, validation),
+        )
+        examined = driver.drive("teacher, held out", sim.Teacher(), range(config["starts"]), record=True)
+        heldout_rows = ~examined.trajectory.reached
+        heldout = Demonstrations(
+            examined.trajectory.sensors, examined.trajectory.commands, examined.step_episode
+        ).where(heldout_rows.tolist())
+        steps = examined.trajectory.step[heldout_rows]
+
+        controllers, rollouts, agreements = {}, {}, {}
+        for name in config["controllers"]:
+            controller = CONTROLLERS[name](learn_from)
+            agreements[name] = measure(controller, moving, heldout, steps, reference)
+            if name == "teacher" and config["body"]["name"] == examined.body:
+                rollouts[name] = examined
+            else:
+                episodes = range(_starts(config, name))
+                rollouts[name] = driver.drive(name, controller.policy, episodes, controller.body, record=True)
+            controllers[name] = controller
+    for name, controller in controllers.items():
+        query = _query_seconds(controller.policy, heldout.sensors.numpy())
+        results.table.append(_row(controller, rollouts[name], agreements[name], query * 1e6))
+        results.records += _records(name, rollouts[name])
+    results.metrics = _metrics(results.table, rollouts, agreements, controllers)
+
+    from experiments.corral_report import write_report  # matplotlib is slow to load, and only needed here
+
+    with _progress(console) as progress:
+        write_report(folder, results, controllers, rollouts, agreements, moving, heldout, progress)
+    results.wall_time_s = time.perf_counter() - began
+    results.write(folder)
+    return results
+
+
+def _starts(config: Mapping[str, Any], name: str) -> int:
+    if name == "teacher_wheeled":
+        return config["wheeled_starts"]
+    return config["starts"] if name in ("teacher", "default", "bundled") else config["other_starts"]
+
+
+def _query_seconds(policy: sim.Policy, readings: np.ndarray, calls: int = 200) -> float:
+    """Median time of one answer to one robot, over readings that the teacher met."""
+    rows = readings[np.linspace(0, len(readings) - 1, calls).astype(int)]
+    zero = np.zeros(1, dtype=np.int64)
+    times = []
+    for row in rows:
+        start = time.perf_counter()
+        policy(row[None], zero, zero)
+        times.append(time.perf_counter() - start)
+    return statistics.median(times)
+
+
+def _row(controller: Controller, rollout: sim.Rollout, agreement: Agreement, query_us: float) -> Row:
+    row = {
+        **asdict(rollout.summary()),
+        "controller": controller.name,
+        "train_agreement": agreement.train,
+        "heldout_agreement": agreement.heldout,
+        "unseen_agreement": agreement.unseen,
+        "pairs_stored": controller.pairs,
+        "bins": controller.bins,
+        "query_us": round(query_us, 1),
+    }
+    return {column: row[column] for column in COLUMNS}
+
+
+def _records(name: str, rollout: sim.Rollout) -> list[Row]:
+    columns = {
+        "episode": rollout.episode,
+        "success": rollout.success,
+        "escaped": rollout.escaped,
+        "time_to_light_s": rollout.time_to_light,
+        "steps": rollout.steps,
+        "dwell_fraction": rollout.dwell,
+        "collision_fraction": rollout.collisions,
+        "start_x": rollout.start[:, 0],
+        "start_y": rollout.start[:, 1],
+        "start_heading": rollout.start[:, 2],
+    }
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
+    return [{"controller": name, "body": rollout.body, **dict(zip(columns, row, strict=True))} for row in rows]
+
+
+def _metrics(
+    table: list[Row],
+    rollouts: Mapping[str, sim.Rollout],
+    agreements: Mapping[str, Agreement],
+    controllers: Mapping[str, Controller],
+) -> dict[str, float | None]:
+    """Every number of the table as `controller.column`, and what the table has no room for."""
+    metrics: dict[str, float | None] = {}
+    for row in table:
+        name = row["controller"]
+        metrics |= {f"{name}.{column}": row[column] for column in COLUMNS[1:]}
+        agreement = agreements[name]
+        metrics[f"{name}.train_agreement_all"] = agreement.train_all
+        metrics[f"{name}.heldout_agreement_distinct"] = agreement.heldout_distinct
+        metrics[f"{name}.unseen_share"] = agreement.unseen_share
+        metrics |= {f"{name}.heldout_agreement.{rule}": share for rule, share in agreement.by_rule.items()}
+        for part, report in controllers[name].reports.items():
+            counts = {key: value for key, value in report.to_dict().items() if key != "rule"}
+            metrics |= {f"{name}.learning.{part}.{key}": float(value) for key, value in counts.items()}
+    if {"teacher", "teacher_wheeled"} <= set(rollouts):
+        wheeled, planar = rollouts["teacher_wheeled"], rollouts["teacher"]
+        same = np.isin(planar.episode, wheeled.episode)
+        metrics["wheeled_minus_planar_success"] = float(wheeled.success.mean() - planar.success[same].mean())
+    return metrics
+
+
+def print_table(results: Results, console: Console) -> None:
+    """The table, rounded, for the terminal."""
+    table = Table(title="Corral escape")
+    titles = ("controller", "episodes", "success [95 %]", "escape", "time s", "dwell", "collide", "train", "held out")
+    for title in (*titles, "unseen", "pairs", "bins", "µs"):
+        table.add_column(title, justify="left" if title == "controller" else "right", no_wrap=True)
+    for row in results.table:
+        cells = {key: _cell(value) for key, value in row.items()}
+        low, high = cells.pop("success_low"), cells.pop("success_high")
+        cells["success_rate"] += f" [{low}, {high}]"
+        table.add_row(*cells.values())
+    console.print(table)
+
+
+def _cell(value: object) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.3f}"[:5] if isinstance(value, float) else str(value)
+
+
+@contextmanager
+def _workers(count: int) -> Iterator[Executor]:
+    # Spawned, so that a worker inherits no threads and no physics clients; one thread each, as there are several.
+    with ProcessPoolExecutor(count, get_context("spawn"), torch.set_num_threads, (1,)) as pool:
+        yield pool
+
+
+def _progress(console: Console) -> Progress:
+    columns = (TextColumn("{task.description:>28}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    return Progress(*columns, console=console)
+
+
+@hydra.main(version_base="1.3", config_path="pkg://experiments.conf", config_name="corral")
+def run(cfg: DictConfig) -> float:
+    """One job: returns the success rate of the first learned controller, for sweeps that optimise it."""
+    console = Console()
+    if not console.is_terminal:
+        console.width = 140  # a file has no width of its own; the table needs this much
+    config = cast(dict[str, Any], OmegaConf.to_container(cfg, resolve=True))
+    folder = Path(HydraConfig.get().runtime.output_dir)
+    if finished(folder, config):
+        console.print(f"{folder} holds the results of these settings already; nothing to do")
+        return 0.0
+    results = study(config, folder, console)
+    print_table(results, console)
+    console.print(f"{folder / 'report.html'} shows it; results.json and records.parquet lie beside it", soft_wrap=True)
+    return 0.0
+
+
+def one_line_errors(app: Callable[[], object], name: str) -> None:
+    """Run a Hydra app; what the user can mend is told in one line, with exit status 1.
+
+    With HYDRA_FULL_ERROR=1 in the environment the whole traceback is shown instead.
+    """
+    if os.environ.get("HYDRA_FULL_ERROR") == "1":
+        app()
+        return
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # makes Hydra raise instead of printing its own report of several lines
+    try:
+        app()
+    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError) as error:
+        print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
+        sys.exit(1)
+
+
+def main() -> None:
+    """The console command `torchvsa-corral`."""
+    one_line_errors(run, "torchvsa-corral")
+
+
+if __name__ == "__main__":
+    main()
