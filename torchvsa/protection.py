@@ -32,7 +32,7 @@ class Protection(nn.Module):
         raise NotImplementedError
 
     def config(self) -> dict[str, str | int]:
-        """The name and options from which `torchvsa.protection` makes it again."""
+        """The name in `PROTECTIONS` and the options from which it is made again."""
         return {"name": self.name}
 
 

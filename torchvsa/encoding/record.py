@@ -1,5 +1,9 @@
 """Role-filler records: a row of sensor values becomes one hypervector."""
 
+import inspect
+from collections.abc import Callable
+from typing import Any
+
 import torch
 from jaxtyping import Int, Shaped
 from torch import Tensor, nn
@@ -46,16 +50,17 @@ class Record(nn.Module):
         if sensors < 1 or levels < 1:
             raise ValueError(f"a record needs at least one sensor and one level; got {sensors} and {levels}")
         self.vsa, self.sensors, self.levels = vsa, sensors, levels
-        self.combination = COMBINATIONS[combine](vsa, **({} if subset is None else {"subset": subset}))
+        self.combination = COMBINATIONS[combine](vsa, **_accepted(combine, COMBINATIONS[combine], subset=subset))
         self.register_buffer("roles", vsa.random(sensors, generator=generator))
-        codes = VALUES[values](vsa, levels, generator=generator, **({} if span is None else {"span": span}))
+        options = _accepted(values, VALUES[values], span=span)
+        codes = VALUES[values](vsa, levels, generator=generator, **options)
         self.register_buffer("codes", codes)
         bound = self.combination.bound(self.roles, codes, generator)
         absent = self.combination.unobserved(bound).expand(sensors, 1, vsa.dim)
         self.register_buffer("table", torch.cat([bound, absent], 1))
 
     def forward(self, indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """Encode each row of indices in `[-1, levels)`.
+        """Encode each row of indices in `[-1, levels)`; their values are not checked, which would stall a GPU.
 
         Raises `ShapeError` unless the rows have one index per sensor.
         """
@@ -65,3 +70,12 @@ class Record(nn.Module):
             )
         entries = self.table[torch.arange(self.sensors, device=indices.device), indices]
         return self.combination.join(entries, indices >= 0)
+
+
+def _accepted(name: str, part: Callable[..., Any], **options: int | None) -> dict[str, int]:
+    """The options that were given; raises if the part does not take one of them."""
+    given = {option: value for option, value in options.items() if value is not None}
+    for option, value in given.items():
+        if option not in inspect.signature(part).parameters:
+            raise ValueError(f"{name!r} takes no {option}; got {option}={value}")
+    return given
