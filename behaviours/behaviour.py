@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor, nn
 
@@ -10,7 +11,7 @@ from behaviours.recall import Recall, scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import ShapeError
-from torchvsa.exact import norms
+from torchvsa.exact import divide, dots, norms
 from torchvsa.memory import best
 
 
@@ -64,7 +65,8 @@ class Behaviour(nn.Module):
         match = best(
             scores(vsa, self.program, conditions, items, norms(items)), vsa.unbound_norm(self.program, conditions)
         )
-        familiarity = vsa.similarity(conditions, self.known)
+        resemblance = dots(conditions, self.known[None])[..., 0]
+        familiarity = divide(resemblance, norms(conditions) * norms(self.known)).to(torch.float32)
         return Recall(self.memory.commands[match.index], match.similarity, match.margin, familiarity)
 
     def clipped(self) -> "Behaviour":

@@ -9,13 +9,11 @@ of the teacher (agreement), and then drives by itself from held-out starts (succ
     python -m experiments.corral controllers=[teacher,default] encoder.bins=16
 """
 
-import os
 import statistics
-import sys
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict
 from multiprocessing import get_context
 from pathlib import Path
@@ -25,9 +23,8 @@ import hydra
 import numpy as np
 import torch
 from hydra.core.hydra_config import HydraConfig
-from hydra.errors import HydraException
+from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
-from omegaconf.errors import OmegaConfBaseException
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
@@ -36,6 +33,7 @@ import sim
 from behaviours import Demonstrations
 from experiments import presets
 from experiments.agreement import Agreement, measure
+from experiments.command_line import errors_in_one_line
 from experiments.controllers import CONTROLLERS, Controller, Study, check_names
 from experiments.results import Results, Row, finished
 
@@ -250,8 +248,8 @@ def _progress(console: Console) -> Progress:
 
 
 @hydra.main(version_base="1.3", config_path="pkg://experiments.conf", config_name="corral")
-def run(cfg: DictConfig) -> float:
-    """One job: returns the success rate of the first learned controller, for sweeps that optimise it."""
+def run(cfg: DictConfig) -> None:
+    """One job."""
     console = Console()
     if not console.is_terminal:
         console.width = 140  # a file has no width of its own; the table needs this much
@@ -259,32 +257,18 @@ def run(cfg: DictConfig) -> float:
     folder = Path(HydraConfig.get().runtime.output_dir)
     if finished(folder, config):
         console.print(f"{folder} holds the results of these settings already; nothing to do")
-        return 0.0
-    results = study(config, folder, console)
+        return
+    # A sweep goes on after a job that failed, and Hydra then says which one it was.
+    with errors_in_one_line("torchvsa-corral") if HydraConfig.get().mode == RunMode.RUN else nullcontext():
+        results = study(config, folder, console)
     print_table(results, console)
     console.print(f"{folder / 'report.html'} shows it; results.json and records.parquet lie beside it", soft_wrap=True)
-    return 0.0
-
-
-def one_line_errors(app: Callable[[], object], name: str) -> None:
-    """Run a Hydra app; what the user can mend is told in one line, with exit status 1.
-
-    With HYDRA_FULL_ERROR=1 in the environment the whole traceback is shown instead.
-    """
-    if os.environ.get("HYDRA_FULL_ERROR") == "1":
-        app()
-        return
-    os.environ["HYDRA_FULL_ERROR"] = "1"  # makes Hydra raise instead of printing its own report of several lines
-    try:
-        app()
-    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError) as error:
-        print(f"{name}: {' '.join(str(error).split())}", file=sys.stderr)
-        sys.exit(1)
 
 
 def main() -> None:
     """The console command `torchvsa-corral`."""
-    one_line_errors(run, "torchvsa-corral")
+    with errors_in_one_line("torchvsa-corral"):
+        run()
 
 
 if __name__ == "__main__":

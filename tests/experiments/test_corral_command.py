@@ -1,0 +1,104 @@
+"""The main job, run as a user would run it."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from commands import SMALL, corral, only, results, without_timings
+
+from experiments.corral import COLUMNS
+from experiments.results import collect
+
+ROWS = "controllers=[teacher,default,paper,paper_best_bins,bundled,hand_written,nearest_neighbour,random]"
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
+    """A small run of most rows: its folder and what the terminal showed."""
+    folder = tmp_path_factory.mktemp("run")
+    run = corral(folder, *SMALL, ROWS, "paper_bins=[2]")
+    assert run.returncode == 0, run.stderr
+    return folder, run.stdout
+
+
+@pytest.mark.slow
+def test_the_table_has_the_promised_rows_and_columns(finished: tuple[Path, str]) -> None:
+    folder, printed = finished
+    content = results(folder)
+    assert [row["controller"] for row in content["table"]] == content["config"]["controllers"]
+    assert all(tuple(row) == COLUMNS for row in content["table"])
+    for row in content["table"]:
+        assert re.search(rf"│ {row['controller']} +│ +{row['episodes']} │", printed), row
+    rows = {row["controller"]: row for row in content["table"]}
+    assert rows["teacher"]["heldout_agreement"] == rows["hand_written"]["heldout_agreement"] == 1.0
+    assert rows["default"]["train_agreement"] >= 0.999
+    assert rows["random"]["heldout_agreement"] < 0.3
+    assert rows["default"]["bins"] == rows["paper"]["bins"] == rows["bundled"]["bins"] == 32
+    assert rows["hand_written"]["pairs_stored"] == 5
+
+
+@pytest.mark.slow
+def test_the_table_is_what_the_records_say(finished: tuple[Path, str]) -> None:
+    folder, _ = finished
+    records = pq.read_table(only(folder, "records.parquet")).to_pylist()
+    for row in results(folder)["table"]:
+        own = [record for record in records if record["controller"] == row["controller"]]
+        assert len(own) == row["episodes"]
+        assert row["success_rate"] == pytest.approx(np.mean([record["success"] for record in own]))
+        assert row["escape_rate"] == pytest.approx(np.mean([record["escaped"] for record in own]))
+        assert results(folder)["metrics"][f"{row['controller']}.success_rate"] == row["success_rate"]
+
+
+@pytest.mark.slow
+def test_all_controllers_meet_the_same_starts(finished: tuple[Path, str]) -> None:
+    records = pq.read_table(only(finished[0], "records.parquet")).to_pylist()
+    starts: dict[int, set[tuple[float, ...]]] = {}
+    for record in records:
+        start = tuple(record[f"start_{axis}"] for axis in ("x", "y", "heading"))
+        starts.setdefault(record["episode"], set()).add(start)
+    assert all(len(poses) == 1 for poses in starts.values())
+    assert len({next(iter(poses)) for poses in starts.values()}) == 6
+
+
+@pytest.mark.slow
+def test_the_page_and_the_animation_are_there(finished: tuple[Path, str]) -> None:
+    folder, printed = finished
+    page = only(folder, "report.html")
+    assert page.name in printed
+    text = page.read_text()
+    assert all(row["controller"] in text for row in results(folder)["table"])
+    assert "data:image/gif;base64," in text
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_results_whatever_the_workers(tmp_path: Path) -> None:
+    contents = []
+    for name, options in (("a", ("workers=1", "robots=4")), ("b", ("workers=2", "robots=64"))):
+        (tmp_path / name).mkdir()
+        run = corral(tmp_path / name, *SMALL, *options, "controllers=[teacher,default,bundled,random]", "animate=false")
+        assert run.returncode == 0, run.stderr
+        contents.append(without_timings(results(tmp_path / name), "workers", "robots"))
+    assert contents[0] == contents[1]
+
+
+@pytest.mark.slow
+def test_a_sweep_of_two_jobs_is_collected_and_not_run_twice(tmp_path: Path) -> None:
+    sweep = (
+        "--multirun",
+        "vsa.dim=500,1000",
+        "hydra.sweep.dir=sweep",
+        "controllers=[default]",
+        "animate=false",
+        *SMALL,
+    )
+    run = corral(tmp_path, *sweep)
+    assert run.returncode == 0, run.stderr
+    jobs = collect(tmp_path / "sweep")
+    assert [job["config"]["vsa"]["dim"] for job in jobs] == [500, 1000]
+    times = [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("results.json"))]
+    again = corral(tmp_path, *sweep)
+    assert again.returncode == 0, again.stderr
+    assert again.stdout.count("nothing to do") == 2
+    assert times == [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("results.json"))]

@@ -1,0 +1,79 @@
+"""What pip installs works outside the checkout."""
+
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from commands import SMALL, only, results
+
+CHECKOUT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The project, built as a wheel and unpacked into a folder of its own, without the packages it depends on."""
+    folder = tmp_path_factory.mktemp("wheel")
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    # The build works on a copy of the tracked files, so that it leaves nothing in the checkout.
+    files = subprocess.run(["git", "ls-files"], cwd=CHECKOUT, capture_output=True, text=True, check=True).stdout
+    for name in files.split():
+        (folder / "source" / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / "source" / name).write_bytes((CHECKOUT / name).read_bytes())
+    subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", folder, folder / "source"], check=True)
+    wheel = only(folder, "*.whl")
+    subprocess.run([*pip, "install", "--no-deps", "--target", folder / "site", wheel], check=True)
+    return folder
+
+
+def run(installed: Path, *command: str | Path) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "PYTHONPATH": str(installed / "site")}
+    return subprocess.run(
+        [sys.executable, *command], cwd=installed, env=environment, capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.slow
+def test_the_wheel_carries_all_configs_and_assets(installed: Path) -> None:
+    names = zipfile.ZipFile(only(installed, "*.whl")).namelist()
+    for path in (CHECKOUT / "conf").rglob("*.yaml"):
+        assert f"experiments/conf/{path.relative_to(CHECKOUT / 'conf').as_posix()}" in names
+    for pattern in ("sim/*.urdf", "experiments/*.html"):
+        for path in CHECKOUT.glob(pattern):
+            assert path.relative_to(CHECKOUT).as_posix() in names
+    packages = {name.split("/")[0] for name in names}
+    assert {"torchvsa", "behaviours", "sim", "experiments"} <= packages
+    assert "tests" not in packages
+
+
+@pytest.mark.slow
+def test_the_console_command_takes_the_users_own_configs(installed: Path) -> None:
+    (installed / "mine" / "experiment").mkdir(parents=True)
+    (installed / "mine" / "experiment" / "tiny.yaml").write_text(
+        "# @package _global_\ncontrollers: [default]\nencoder: {bins: 16}\n"
+    )
+    command = installed / "site" / "bin" / "torchvsa-corral"
+    done = run(installed, command, "--config-dir", "mine", "experiment=tiny", "animate=false", *SMALL)
+    assert done.returncode == 0, done.stderr
+    content = results(installed / "outputs")
+    assert content["config"]["encoder"]["bins"] == content["table"][0]["bins"] == 16
+
+
+@pytest.mark.slow
+def test_it_is_the_installed_code_that_ran(installed: Path) -> None:
+    done = run(installed, "-c", "import torchvsa, behaviours, sim, experiments; print(experiments.__file__)")
+    assert done.stdout.strip() == str(installed / "site" / "experiments" / "__init__.py")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("missing", "works"), [("hydra", "torchvsa, behaviours"), ("pybullet", "torchvsa, behaviours")]
+)
+def test_without_the_extra(installed: Path, missing: str, works: str) -> None:
+    hide = f"import sys; sys.modules[{missing!r}] = None; "
+    assert run(installed, "-c", f"{hide}import {works}").returncode == 0
+    done = run(installed, "-c", f"{hide}import experiments")
+    assert done.returncode == 1
+    assert done.stderr.strip().splitlines()[-1].endswith("pip install 'torchvsa[corral]'")

@@ -1,0 +1,45 @@
+"""What the README says is true."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import torch
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+
+
+def python_block() -> str:
+    (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    return block
+
+
+def test_the_ten_lines_run_and_answer() -> None:
+    lines = [line for line in python_block().splitlines() if line.strip()]
+    assert len(lines) == 10
+    code = python_block() + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
+    code += "assert 'program' in steer.state_dict() and steer.program.shape == (4000,)\n"
+    run = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
+    assert "program" in run.stdout
+
+
+def test_the_files_that_it_names_are_there() -> None:
+    for link in re.findall(r"\]\(((?!http)[^)]+)\)", README) + re.findall(r"`((?:\w+/)+[\w./]*)`", README):
+        if not link.startswith("outputs/"):
+            assert (ROOT / link).exists(), link
+
+
+def test_the_commands_are_targets_of_make() -> None:
+    makefile = (ROOT / "Makefile").read_text()
+    for target in re.findall(r"^make (\w+)", README, re.MULTILINE):
+        assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
+
+
+def test_the_version_is_said_once() -> None:
+    import torchvsa
+
+    assert f'version = "{torchvsa.__version__}"' in (ROOT / "pyproject.toml").read_text()
+    assert torch.__version__.split("+")[0] == "2.13.0"
