@@ -6,6 +6,7 @@ import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor, nn
 
+from behaviours.ordered import in_order_of_appearance
 from behaviours.space import Space
 from torchvsa import CleanUp, ShapeError
 
@@ -61,11 +62,3 @@ def decode(space: Space, levels: Int64[Tensor, "k m"], items: Shaped[Tensor, "k 
         noisy = space.vsa.unbind(items, space.results.roles[actuator])
         columns.append(stored[values(noisy).index])
     return space.schema.command_values(torch.stack(columns, -1))
-
-
-def in_order_of_appearance(values: Int64[Tensor, "k"]) -> Int64[Tensor, "distinct"]:
-    """The distinct values, each where it first appears."""
-    distinct, inverse = values.unique(return_inverse=True)
-    first = torch.full((len(distinct),), len(values), device=values.device)
-    first = first.scatter_reduce(0, inverse, torch.arange(len(values), device=values.device), "amin")
-    return distinct[first.argsort()]

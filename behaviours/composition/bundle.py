@@ -10,7 +10,7 @@ from torch import Tensor
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
-from behaviours.learning.samples import distinct_rows
+from behaviours.ordered import distinct_rows
 from behaviours.recall import Recall, scores
 from behaviours.report import LearningReport
 from torchvsa.exact import norms, signed

@@ -10,7 +10,7 @@ from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.samples import Samples
-from behaviours.memory import in_order_of_appearance
+from behaviours.ordered import first_rows, in_order_of_appearance
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa.exact import divide, norms, paired_dots
@@ -49,7 +49,7 @@ class OneShot(Rule):
         added = _Sums(space, samples, self.clip_each_step)
         if self.known == "equality":
             # Nothing is forgotten: each condition is added where it first appears.
-            added.extend(_first_appearances(samples.condition))
+            added.extend(first_rows(samples.condition))
             stored = samples.condition[added.rows]
             accepted = torch.zeros(len(samples.condition), dtype=torch.bool)
             accepted[added.rows] = True
@@ -124,12 +124,6 @@ class _Sums:
         if not self.rows:
             return self.vsa.normalize(self.vsa.superpose(terms))
         return self.vsa.bundle(torch.stack([total.to(terms.dtype), terms[0]]))
-
-
-def _first_appearances(values: Tensor) -> Tensor:
-    """The first row of each distinct value, in order."""
-    first = torch.full((int(values.max()) + 1,), len(values))
-    return first.scatter_reduce(0, values, torch.arange(len(values)), "amin").sort().values
 
 
 def _count(rule: str, samples: Samples, accepted: Tensor, stored: int) -> LearningReport:

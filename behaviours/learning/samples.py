@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 
-import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
 from behaviours.demonstrations import Demonstrations
+from behaviours.ordered import distinct_rows
 from behaviours.space import Space
 
 
@@ -39,16 +39,3 @@ class Samples:
         encoded, merged = distinct_rows(space.encode(distinct_bins))
         distinct_results, result = distinct_rows(levels)
         return cls(encoded, distinct_results, merged[condition], result)
-
-
-def distinct_rows(rows: Shaped[Tensor, "N c"]) -> tuple[Shaped[Tensor, "k c"], Int64[Tensor, "N"]]:
-    """The distinct rows in order of first appearance, and for each row which of them it is."""
-    comparable = torch.view_as_real(rows).flatten(1) if rows.is_complex() else rows
-    _, inverse = comparable.unique(dim=0, return_inverse=True)
-    count = int(inverse.max()) + 1
-    first = torch.full((count,), len(rows), device=rows.device)
-    first = first.scatter_reduce(0, inverse, torch.arange(len(rows), device=rows.device), "amin")
-    order = first.argsort()
-    rank = torch.empty_like(order)
-    rank[order] = torch.arange(count, device=rows.device)
-    return rows[first[order]], rank[inverse]

@@ -14,7 +14,7 @@ from torch.testing import assert_close
 
 import torchvsa
 from behaviours import Actuator, Demonstrations, Encoder, ErrorDriven, OneShot, Rule, Schema, Sensor, Space
-from behaviours.memory import in_order_of_appearance
+from behaviours.ordered import in_order_of_appearance
 
 PROTECTIONS = (
     {"name": "self_shift", "width": "mean"},
