@@ -1,0 +1,275 @@
+"""Gymnasium's `CorralEscape-v0`: the corral as an environment, one robot or many. Registered by `import sim`."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from sim.camera import photograph
+from sim.corral import Arena
+from sim.fleet import Fleet, State, check_commands, control_steps
+from sim.robot import ACTUATORS, CONTROL_HZ
+from sim.sensors import SENSORS
+from sim.tracker import DWELL_SECONDS, Tracker
+
+MAX_STEPS = 60 * CONTROL_HZ
+"""Control steps after which Gymnasium truncates an episode: 60 s."""
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+def _box(table: tuple[tuple[str, float, float, str], ...]) -> spaces.Box:
+    low, high = np.array([[row[1], row[2]] for row in table]).T
+    return spaces.Box(low, high, dtype=np.float64)
+
+
+def _check_render_mode(render_mode: str | None) -> None:
+    if render_mode not in (None, "rgb_array"):
+        raise ValueError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
+
+
+class _Cells:
+    """What both environments share: robots, their episodes, and what counts in them."""
+
+    def __init__(self, size: int, arena: str | Arena, body: str, dwell: float) -> None:
+        self.tracker = Tracker(size, control_steps(dwell))
+        self.fleet = Fleet(size, arena, body)
+        self.episodes = np.zeros(size, dtype=np.int64)
+
+    def reset(self, slot: int, episode: int) -> None:
+        self.fleet.reset(slot, episode)
+        self.tracker.reset(slot)
+        self.episodes[slot] = episode
+
+    def observe(self) -> State:
+        slots = range(len(self.episodes))
+        state = self.fleet.observe(slots)
+        self.tracker.observe(np.arange(len(self.episodes)), state)
+        return state
+
+    def drive(self, slots: list[int], action: object) -> None:
+        commands = check_commands(action, len(slots))
+        if not np.isfinite(commands).all():
+            raise ValueError(f"action {commands.tolist()}; expected finite commands in [-1, 1]")
+        self.fleet.drive(slots, commands)
+
+    def info(self, state: State) -> dict[str, NDArray[Any]]:
+        return {
+            "episode": self.episodes.copy(),
+            "pose": np.stack([state.x, state.y, state.heading], axis=1),
+            "contact": state.contact,
+            "at_lamp": state.at_lamp,
+            "escaped": self.tracker.escaped.copy(),
+            "success": self.tracker.success.copy(),
+        }
+
+
+class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
+    """
+    ## Description
+
+    A round robot with a differential drive stands in a square corral with one gap. Outside, beyond the gap, stands a
+    lamp. The robot is to find the lamp and to stay there. This is the corral-escape task of Neubert et al. 2016,
+    section IV; `sim.Teacher` solves it with five if-else rules.
+
+    ## Action space
+
+    `Box(-1, 1, (2,), float64)`; values outside are clipped. One action lasts one control step, 1/20 s.
+
+    | index | command     | min | max | unit                             |
+    |-------|-------------|-----|-----|----------------------------------|
+    | 0     | left wheel  | -1  | 1   | fraction of full speed (0.4 m/s) |
+    | 1     | right wheel | -1  | 1   | fraction of full speed (0.4 m/s) |
+
+    Each wheel turns with its commanded speed times `1 + wheel_noise * N(0, 1)`, drawn anew for each control step.
+
+    ## Observation space
+
+    `Box(0, high, (3,), float64)`, without noise.
+
+    | index | reading     | min | max | unit | at its maximum where                                         |
+    |-------|-------------|-----|-----|------|--------------------------------------------------------------|
+    | 0     | light left  | 0   | 5   | m    | the lamp is out of the cone, beyond 4.5 m or behind a wall   |
+    | 1     | light right | 0   | 5   | m    | the same, for the right sensor                               |
+    | 2     | distance    | 0   | 0.6 | m    | none of the three beams ahead meets a wall                   |
+
+    ## Reward
+
+    1 for the control step that completes the dwell time at the lamp, 0 for all others.
+
+    ## Start
+
+    Uniform over the corral less a margin, any heading. `reset(seed=s)` begins episode 0 of seed `s`, each further
+    `reset()` the next one; `reset(options={"episode": k})` begins episode `k`. The start and the wheel noise depend on
+    (seed, episode) alone: they are those of `sim.rollout(..., seed=s, episodes=[k])`.
+
+    ## End
+
+    Terminated: the robot touched the lamp in every state of the dwell time. Truncated: after 1,200 control steps
+    (60 s), by Gymnasium's time limit.
+
+    `info` holds `episode`, `pose` (x, y in m, heading in rad), `contact` (with a wall), `at_lamp`, `escaped` (was
+    outside the corral) and `success`.
+
+    ## Arguments
+
+    | argument      | default     | meaning                                                            |
+    |---------------|-------------|--------------------------------------------------------------------|
+    | `arena`       | `"default"` | a name in `sim.ARENAS`, or an `Arena`                              |
+    | `body`        | `"planar"`  | a name in `sim.BODIES`: `planar` is fast, `wheeled` stands on wheels |
+    | `dwell`       | 2.0         | seconds at the lamp that make a success                            |
+    | `render_mode` | None        | `"rgb_array"`: a picture `[H, W, 3]` uint8, without a display      |
+
+    ## Versions
+
+    * v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": CONTROL_HZ}  # noqa: RUF012
+
+    def __init__(
+        self,
+        arena: str | Arena = "default",
+        body: str = "planar",
+        dwell: float = DWELL_SECONDS,
+        render_mode: str | None = None,
+    ) -> None:
+        _check_render_mode(render_mode)
+        self.render_mode = render_mode
+        self.observation_space = _box(SENSORS)
+        self.action_space = _box(ACTUATORS)
+        self._cells = _Cells(1, arena, body, dwell)
+        self._episode: int | None = None
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Begin an episode (see "Start"). Raises `ValueError` for an option other than `episode`."""
+        super().reset(seed=seed)
+        if seed is not None or self._episode is None:
+            self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+            self._episode = -1
+        unknown = set(options or {}) - {"episode"}
+        if unknown:
+            raise ValueError(f"unknown reset options {sorted(unknown)}; expected 'episode' alone")
+        self._episode = int((options or {}).get("episode", self._episode + 1))
+        self._cells.reset(0, self._episode)
+        state = self._cells.observe()
+        return state.sensors[0], self._info(state)
+
+    def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
+        """Drive for one control step. Raises `ValueError` for an action that is not two finite numbers."""
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        self._cells.drive([0], np.asarray(action)[None])
+        state = self._cells.observe()
+        success = bool(self._cells.tracker.success[0])
+        return state.sensors[0], float(success), success, False, self._info(state)
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """A picture `[H, W, 3]`, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return photograph(self._cells.fleet.worlds[0].client, self._cells.fleet.arena)
+
+    def close(self) -> None:
+        """Disconnect the physics client; closing twice is fine."""
+        self._cells.fleet.close()
+
+    def _info(self, state: State) -> dict[str, Any]:
+        return {
+            name: column[0] if column.ndim > 1 else column[0].item() for name, column in self._cells.info(state).items()
+        }
+
+
+class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
+    """`num_envs` corrals side by side: `CorralEscapeEnv` row by row, bit for bit.
+
+    Autoreset mode `NEXT_STEP`: the step after an episode's last one ignores that row's action and returns the first
+    observation of its next episode, with reward 0. With `reset(seed=s)`, environment `i` plays the episodes
+    `i`, `i + num_envs`, `i + 2 * num_envs`, ... of seed `s`. `info` holds the scalar's entries as arrays. Arguments as
+    there; `max_episode_steps` truncates.
+    """
+
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["rgb_array"],
+        "render_fps": CONTROL_HZ,
+        "autoreset_mode": AutoresetMode.NEXT_STEP,
+    }
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        max_episode_steps: int = MAX_STEPS,
+        arena: str | Arena = "default",
+        body: str = "planar",
+        dwell: float = DWELL_SECONDS,
+        render_mode: str | None = None,
+    ) -> None:
+        _check_render_mode(render_mode)
+        self.num_envs = num_envs
+        self.render_mode = render_mode
+        self.single_observation_space = _box(SENSORS)
+        self.single_action_space = _box(ACTUATORS)
+        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        self.action_space = batch_space(self.single_action_space, num_envs)
+        self._max_episode_steps = max_episode_steps
+        self._cells = _Cells(num_envs, arena, body, dwell)
+        self._over = np.zeros(num_envs, dtype=np.bool_)
+        self._ready = False
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
+        """Begin the first episode of every environment. Raises `ValueError` for any option."""
+        super().reset(seed=seed)
+        if options:
+            raise ValueError(f"unknown reset options {sorted(options)}; the vector environment takes none")
+        self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+        for slot in range(self.num_envs):
+            self._cells.reset(slot, slot)
+        self._over[:] = False
+        self._ready = True
+        state = self._cells.observe()
+        return state.sensors, self._cells.info(state)
+
+    def step(self, actions: Floats) -> tuple[Floats, Floats, Flags, Flags, dict[str, Any]]:
+        """Drive each robot for one control step, or begin its next episode if the last one is over."""
+        if not self._ready:
+            raise gymnasium.error.ResetNeeded("call reset() before step()")
+        commands = check_commands(actions, self.num_envs)
+        again = self._over
+        going = np.flatnonzero(~again).tolist()
+        if going:
+            self._cells.drive(going, commands[going])
+        for slot in np.flatnonzero(again).tolist():
+            self._cells.reset(slot, int(self._cells.episodes[slot]) + self.num_envs)
+        state = self._cells.observe()
+        terminated = self._cells.tracker.success.copy()
+        truncated = ~terminated & (self._cells.tracker.clock >= self._max_episode_steps)
+        self._over = terminated | truncated
+        return state.sensors, terminated.astype(np.float64), terminated, truncated, self._cells.info(state)
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """One picture `[H, W, 3]` per environment, or None without a render mode."""
+        if self.render_mode is None:
+            return None
+        return tuple(photograph(world.client, self._cells.fleet.arena) for world in self._cells.fleet.worlds)
+
+    def close_extras(self, **_: Any) -> None:
+        """Disconnect the physics clients."""
+        self._cells.fleet.close()
+
+
+def register() -> None:
+    """Register `CorralEscape-v0`, once."""
+    if "CorralEscape-v0" not in gymnasium.registry:
+        gymnasium.register(
+            id="CorralEscape-v0",
+            entry_point="sim.env:CorralEscapeEnv",
+            vector_entry_point="sim.env:CorralEscapeVectorEnv",
+            max_episode_steps=MAX_STEPS,
+        )

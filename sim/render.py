@@ -1,0 +1,264 @@
+"""Pictures of rollouts: the corral from above, trajectories, and two robots side by side as an animation.
+
+Not imported by `sim` itself, which needs no matplotlib: `from sim import render`.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle, Rectangle
+from PIL import Image, ImageDraw, ImageFont
+
+from sim.corral import Arena
+from sim.result import Rollout, Steps
+from sim.robot import CONTROL_HZ, RADIUS
+from sim.sensors import DISTANCE_MAX, LIGHT_MAX
+from sim.teacher import BEHAVIOURS, Teacher
+
+WALL, LAMP, INK, PAPER = "#3d4654", "#f5b400", "#22272f", "#ffffff"
+COLOURS = {"seek_light": "#e07b00", "avoid": "#c8324b", "cruise": "#3f74b5"}
+"""One colour for each behaviour that the readings call for."""
+
+
+def draw_corral(ax: Axes, arena: Arena) -> None:
+    """Draw walls, gap and lamp from above into `ax`, in m, with equal scales and without frame."""
+    for x, y, half_x, half_y in arena.walls.tolist():
+        ax.add_patch(Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, color=WALL, lw=0, zorder=2))
+    for scale, alpha in ((3.2, 0.10), (2.2, 0.16), (1.5, 0.25), (1.0, 1.0)):
+        ax.add_patch(Circle(arena.lamp, scale * arena.lamp_radius, color=LAMP, alpha=alpha, lw=0, zorder=1))
+    left, right, bottom, top = _extent(arena)
+    ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xticks=[], yticks=[])
+    ax.set_axis_off()
+
+
+def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = None, legend: bool = True) -> None:
+    """Draw a corral and trajectories in it, coloured by the behaviour that the readings call for.
+
+    Starts are hollow dots; a cross marks where a robot ended that did not succeed.
+
+    Args:
+        ax: where to draw.
+        rollout: a recorded one.
+        episodes: which; the first 12 unless told.
+        legend: explain colours and marks under the picture.
+
+    Raises:
+        KeyError: an episode that is not there, or a rollout without trajectories.
+    """
+    draw_corral(ax, rollout.arena)
+    for episode in rollout.episode[:12].tolist() if episodes is None else episodes:
+        path = rollout.slice(episode)
+        points = np.stack([path.x, path.y], axis=1)
+        pieces = np.stack([points[:-1], points[1:]], axis=1)
+        colours = [_COLOUR_OF_RULE[rule] for rule in Teacher().rule(path.sensors[:-1]).tolist()]
+        ax.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.1, alpha=0.75, zorder=3))
+        # Avoiding turns on the spot: a line alone would hide it.
+        turns = points[Teacher().rule(path.sensors) == _AVOID]
+        ax.scatter(turns[:, 0], turns[:, 1], s=9, color=COLOURS["avoid"], lw=0, zorder=4)
+        ax.plot(*points[0], "o", ms=5, mfc=PAPER, mec=INK, mew=1.2, zorder=5)
+        if not rollout.success[rollout.episode == episode][0]:
+            ax.plot(*points[-1], "X", ms=8, mfc=COLOURS["avoid"], mec=PAPER, mew=0.8, zorder=6)
+    if legend:
+        handles = [Line2D([], [], color=colour, lw=2, label=name.replace("_", " ")) for name, colour in COLOURS.items()]
+        handles.append(Line2D([], [], ls="", marker="o", ms=5, mfc=PAPER, mec=INK, label="start"))
+        handles.append(
+            Line2D([], [], ls="", marker="X", ms=7, mfc=COLOURS["avoid"], mec=PAPER, label="did not succeed")
+        )
+        ax.legend(
+            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.02), ncols=5, fontsize=8, frameon=False,
+            handlelength=1.4, columnspacing=1.2,
+        )  # fmt: skip
+
+
+def animate(
+    rollouts: Sequence[Rollout],
+    titles: Sequence[str],
+    path: str | os.PathLike[str],
+    episode: int | None = None,
+    speed: float = 2.0,
+    frames: int = 150,
+) -> Path:
+    """Write a GIF of one episode of several rollouts side by side, with trails and the time.
+
+    The robot's outline, its lit light sensors and its distance beam are drawn from the recorded readings. The file
+    appears whole or not at all.
+
+    Args:
+        rollouts: recorded, in the same arena.
+        titles: one a rollout.
+        path: the file to write; its folder must exist.
+        episode: which; the most typical one that succeeds in all unless told (of median length).
+        speed: how many times faster than real.
+        frames: at most this many; a longer episode is drawn in larger steps.
+
+    Raises:
+        ValueError: not one title a rollout, different arenas, no common episode, or numbers out of range.
+        KeyError: the episode is missing in a rollout, or was not recorded.
+    """
+    if not rollouts or len(rollouts) != len(titles):
+        raise ValueError(f"{len(rollouts)} rollouts and {len(titles)} titles; expected one title a rollout")
+    if len({rollout.arena for rollout in rollouts}) > 1:
+        raise ValueError("the rollouts are from different arenas; expected the same one")
+    if speed <= 0 or frames < 1:
+        raise ValueError(f"speed={speed}, frames={frames}; expected a speed above 0 and at least 1 frame")
+    chosen = _typical(rollouts) if episode is None else episode
+    panels = [
+        _Panel(rollout.slice(chosen), title, rollout.arena) for rollout, title in zip(rollouts, titles, strict=True)
+    ]
+    length = max(len(panel) for panel in panels)
+    # Two control steps a frame are smooth; at least 20 ms a frame, below which viewers slow a GIF down.
+    stride = max(2, -(-length // frames), math.ceil(speed * 0.02 * CONTROL_HZ))
+    ticks = [*range(0, length - 1, stride), length - 1]
+    images = [_join([panel.frame(tick) for panel in panels], speed) for tick in ticks]
+    palette = _join([panel.frame(length - 1) for panel in panels], speed).quantize(128)
+    images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+    delay = round(1000 * stride / CONTROL_HZ / speed)
+    buffer = io.BytesIO()
+    images[0].save(
+        buffer, "GIF", save_all=True, append_images=images[1:], loop=0, optimize=False,
+        duration=[delay] * (len(images) - 1) + [1500],
+    )  # fmt: skip
+    return _write(Path(path), buffer.getvalue())
+
+
+def _typical(rollouts: Sequence[Rollout]) -> int:
+    """The common episode whose length is the median, among those that succeed in as many rollouts as possible."""
+    common = sorted(set.intersection(*(set(rollout.episode.tolist()) for rollout in rollouts)))
+    if not common:
+        raise ValueError("the rollouts have no episode in common to show side by side")
+    scored = []
+    for episode in common:
+        rows = [int(np.flatnonzero(rollout.episode == episode)[0]) for rollout in rollouts]
+        wins = sum(bool(rollout.success[row]) for rollout, row in zip(rollouts, rows, strict=True))
+        steps = max(int(rollout.steps[row]) for rollout, row in zip(rollouts, rows, strict=True))
+        scored.append((wins, steps, episode))
+    best = max(wins for wins, *_ in scored)
+    lengths = sorted((steps, episode) for wins, steps, episode in scored if wins == best)
+    return lengths[(len(lengths) - 1) // 2][1]
+
+
+def _extent(arena: Arena) -> tuple[float, float, float, float]:
+    margin, half, (lamp_x, lamp_y) = 0.2, arena.side / 2 + arena.wall_thickness, arena.lamp
+    glow = 2.2 * arena.lamp_radius
+    return -half - margin, lamp_x + glow + margin, min(-half, lamp_y - glow) - margin, max(half, lamp_y + glow) + margin
+
+
+_COLOUR_OF_RULE = {rule: COLOURS[name] for name, rules in BEHAVIOURS.items() for rule in rules}
+_BEHAVIOUR_OF_RULE = {rule: name.replace("_", " ") for name, rules in BEHAVIOURS.items() for rule in rules}
+(_AVOID,) = BEHAVIOURS["avoid"]
+
+
+class _Panel:
+    """One robot's picture, drawn `_FINE` times too large and scaled down, which smooths every edge."""
+
+    _WIDTH, _FINE, _HEAD, _FOOT = 400, 2, 34, 24
+
+    def __init__(self, path: Steps, title: str, arena: Arena) -> None:
+        self._path = path
+        self._title = title
+        self._rules = Teacher().rule(path.sensors).tolist()
+        left, right, bottom, top = _extent(arena)
+        self._scale = self._WIDTH * self._FINE / (right - left)
+        self._origin = left, top
+        size = self._WIDTH * self._FINE, round((top - bottom) * self._scale)
+        self._trail = Image.new("RGB", size, PAPER)
+        self._drawn = 0
+        pen = ImageDraw.Draw(self._trail)
+        for scale, colour in ((3.2, "#fef8e5"), (2.3, "#fdeebf"), (1.6, "#fbdf8a"), (1.0, LAMP)):
+            self._disc(pen, *arena.lamp, scale * arena.lamp_radius, fill=colour)
+        for x, y, half_x, half_y in arena.walls.tolist():
+            pen.rectangle([self._at(x - half_x, y + half_y), self._at(x + half_x, y - half_y)], fill=WALL)
+        self._disc(pen, float(path.x[0]), float(path.y[0]), 0.05, fill=PAPER, outline=INK, width=2 * self._FINE)
+
+    def __len__(self) -> int:
+        return len(self._path)
+
+    def frame(self, tick: int) -> Image.Image:
+        """The picture at control step `tick`; a robot that is done stays where it ended."""
+        tick = min(tick, len(self) - 1)
+        path = self._path
+        pen = ImageDraw.Draw(self._trail)
+        for i in range(self._drawn, tick):
+            ends = [self._at(path.x[k], path.y[k]) for k in (i, i + 1)]
+            pen.line(ends, fill=_COLOUR_OF_RULE[self._rules[i]], width=2 * self._FINE)
+            if self._rules[i] == _AVOID:
+                self._disc(pen, float(path.x[i]), float(path.y[i]), 0.035, fill=COLOURS["avoid"])
+        self._drawn = max(self._drawn, tick)
+        image = self._trail.copy()
+        self._robot(ImageDraw.Draw(image), tick)
+        image = image.resize((image.width // self._FINE, image.height // self._FINE), Image.Resampling.BOX)
+        framed = Image.new("RGB", (image.width, image.height + self._HEAD + self._FOOT), PAPER)
+        framed.paste(image, (0, self._HEAD))
+        text = ImageDraw.Draw(framed)
+        text.text((12, 9), self._title, fill=INK, font=_font(17, bold=True))
+        clock = f"{tick / CONTROL_HZ:4.1f} s"
+        text.text((image.width - 12, 10), clock, fill=INK, font=_font(16), anchor="ra")
+        note = "at the lamp" if path.at_lamp[tick] else _BEHAVIOUR_OF_RULE[self._rules[tick]]
+        text.text((12, framed.height - 26), note, fill=_COLOUR_OF_RULE[self._rules[tick]], font=_font(14, bold=True))
+        return framed
+
+    def _robot(self, pen: ImageDraw.ImageDraw, tick: int) -> None:
+        x, y, heading = (float(column[tick]) for column in (self._path.x, self._path.y, self._path.heading))
+        left, right, distance = self._path.sensors[tick].tolist()
+        ahead = np.array([np.cos(heading), np.sin(heading)])
+        aside = np.array([-ahead[1], ahead[0]])
+        here = np.array([x, y])
+        if distance < DISTANCE_MAX:
+            ends = [self._at(*(here + reach * ahead)) for reach in (RADIUS, RADIUS + distance)]
+            pen.line(ends, fill=COLOURS["avoid"], width=2 * self._FINE)
+        self._disc(pen, x, y, RADIUS, fill=_COLOUR_OF_RULE[self._rules[tick]], outline=INK, width=self._FINE)
+        nose = [self._at(*(here + RADIUS * (a * ahead + b * aside))) for a, b in ((0.8, 0), (0.1, 0.4), (0.1, -0.4))]
+        pen.polygon(nose, fill=PAPER)
+        for reading, side in ((left, 1.0), (right, -1.0)):
+            eye_x, eye_y = (here + RADIUS * (0.5 * ahead + 0.87 * side * aside)).tolist()
+            lit = reading < LIGHT_MAX
+            self._disc(pen, eye_x, eye_y, 0.05, fill="#ffd21f" if lit else "#9aa3af", outline=INK, width=self._FINE)
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
+        return (float(x) - self._origin[0]) * self._scale, (self._origin[1] - float(y)) * self._scale
+
+    def _disc(self, pen: ImageDraw.ImageDraw, x: float, y: float, radius: float, **style: object) -> None:
+        (u, v), r = self._at(x, y), radius * self._scale
+        pen.ellipse([u - r, v - r, u + r, v + r], **style)  # pyright: ignore[reportArgumentType]
+
+
+def _join(frames: Sequence[Image.Image], speed: float) -> Image.Image:
+    gap = 8
+    width = sum(frame.width for frame in frames) + gap * (len(frames) - 1)
+    joined = Image.new("RGB", (width, max(frame.height for frame in frames)), "#d5d9df")
+    left = 0
+    for frame in frames:
+        joined.paste(frame, (left, 0))
+        left += frame.width + gap
+    pen = ImageDraw.Draw(joined)
+    pen.text((width - 12, joined.height - 26), f"{speed:g}x", fill="#7b8494", font=_font(14), anchor="ra")
+    return joined
+
+
+def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, size)
+
+
+def _write(path: Path, content: bytes) -> Path:
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.chmod(name, 0o644)
+        os.replace(name, path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise
+    return path

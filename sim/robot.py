@@ -1,0 +1,224 @@
+"""The robot: a round differential drive, as an ideal planar body or as wheels on a floor.
+
+Both bodies have the same outline, track and speeds, take the same wheel speeds and report the same pose, so that
+what is measured with the fast one can be checked with the true one.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Protocol
+
+import pybullet
+
+from sim.corral import ROBOT_GROUP, ROBOT_MASK, WALL_GROUP, WALL_MASK, Start
+
+RADIUS = 0.15
+"""Radius of the robot's outline, m."""
+TRACK = 0.26
+"""Distance between the wheels, m."""
+MAX_SPEED = 0.4
+"""Speed of a wheel at command 1, m/s."""
+CONTROL_HZ = 20
+"""Control steps per second."""
+WHEEL_RADIUS = 0.04
+"""Of the wheeled body, m."""
+HEIGHT = 0.06
+"""Height of the body's centre above the floor, m."""
+
+ACTUATORS: tuple[tuple[str, float, float, str], ...] = (
+    ("left_motor", -1.0, 1.0, "fraction of full speed"),
+    ("right_motor", -1.0, 1.0, "fraction of full speed"),
+)
+"""The commands in order: (name, low, high, unit)."""
+
+Pose = tuple[float, float, float, float]
+"""x, y in m, cosine and sine of the heading."""
+
+
+class Body(Protocol):
+    """A robot in a pybullet client of its own."""
+
+    id: int
+    """The body's id in its client, for cameras."""
+
+    def __init__(self, client: int) -> None:
+        """Build the robot in `client`, and set the engine's parameters for it."""
+        ...
+
+    def place(self, start: Start) -> Pose:
+        """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
+        ...
+
+    def drive(self, left: float, right: float) -> Pose:
+        """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
+        ...
+
+
+class PlanarBody:
+    """A body without ground contact: its velocity follows from the wheel speeds, pybullet resolves the contacts.
+
+    Collides as a sphere whose equator lies below the lamp's top, so that contact normals are horizontal and the
+    body neither tilts, rises nor sinks. It is frictionless: contacts stop and deflect it, but never turn it.
+    """
+
+    _SUBSTEPS = 2
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=1 / (CONTROL_HZ * self._SUBSTEPS),
+            numSolverIterations=10,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        pybullet.setGravity(0, 0, 0, physicsClientId=client)
+        collision = pybullet.createCollisionShape(pybullet.GEOM_SPHERE, radius=RADIUS, physicsClientId=client)
+        visual = pybullet.createVisualShapeArray(
+            shapeTypes=[pybullet.GEOM_CYLINDER, pybullet.GEOM_BOX],
+            radii=[RADIUS, 0],
+            lengths=[0.07, 0],
+            halfExtents=[[0, 0, 0], [0.05, 0.03, 0.015]],
+            visualFramePositions=[[0, 0, 0], [0.09, 0, 0.05]],
+            rgbaColors=[[0.13, 0.35, 0.72, 1], [0.95, 0.95, 0.97, 1]],
+            physicsClientId=client,
+        )
+        self.id = pybullet.createMultiBody(
+            1.0,
+            collision,
+            visual,
+            [0, 0, HEIGHT],
+            physicsClientId=client,
+        )
+        pybullet.setCollisionFilterGroupMask(self.id, -1, ROBOT_GROUP, ROBOT_MASK, physicsClientId=client)
+        pybullet.changeDynamics(
+            self.id,
+            -1,
+            linearDamping=0,
+            angularDamping=0,
+            lateralFriction=0,
+            rollingFriction=0,
+            spinningFriction=0,
+            restitution=0,
+            activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+            physicsClientId=client,
+        )
+        self._pose = _pose(self.id, client)
+
+    def place(self, start: Start) -> Pose:
+        """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
+        self._pose = _place(self.id, start, self._client)
+        return self._pose
+
+    def drive(self, left: float, right: float) -> Pose:
+        """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
+        client, body = self._client, self.id
+        speed, turn = (left + right) / 2, (right - left) / TRACK
+        step = turn / (CONTROL_HZ * self._SUBSTEPS)
+        # Each physics step goes straight along the middle heading of its arc.
+        heading = math.atan2(self._pose[3], self._pose[2]) + step / 2
+        for _ in range(self._SUBSTEPS):
+            velocity = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
+            pybullet.resetBaseVelocity(body, velocity, (0.0, 0.0, turn), client)
+            pybullet.stepSimulation(client)
+            heading += step
+        self._pose = _pose(body, client)
+        return self._pose
+
+
+class WheeledBody:
+    """Two driven wheels and two casters on a floor, from `robot.urdf`; wheel motors hold the commanded speeds."""
+
+    _SUBSTEPS = 6
+    _TORQUE = 0.3  # N m a wheel: reaches full speed within one control step, stalls against a wall
+    _GRIP = 1.0
+
+    def __init__(self, client: int) -> None:
+        self._client = client
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=1 / CONTROL_HZ,
+            numSubSteps=self._SUBSTEPS,
+            numSolverIterations=10,
+            deterministicOverlappingPairs=1,
+            physicsClientId=client,
+        )
+        pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
+        plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
+        # A plane without a picture of its own is drawn as a checkerboard; a speck under the floor prevents it.
+        speck = pybullet.createVisualShape(
+            pybullet.GEOM_SPHERE, radius=0.001, visualFramePosition=[0, 0, -0.5], physicsClientId=client
+        )
+        floor = pybullet.createMultiBody(0, plane, speck, physicsClientId=client)
+        pybullet.setCollisionFilterGroupMask(floor, -1, WALL_GROUP, WALL_MASK, physicsClientId=client)
+        pybullet.changeDynamics(floor, -1, lateralFriction=1, restitution=0, physicsClientId=client)
+        self.id = pybullet.loadURDF(
+            str(Path(__file__).with_name("robot.urdf")),
+            [0, 0, HEIGHT],
+            physicsClientId=client,
+        )
+        joints = {
+            pybullet.getJointInfo(self.id, i, physicsClientId=client)[1]: i
+            for i in range(pybullet.getNumJoints(self.id, physicsClientId=client))
+        }
+        self._wheels = [joints[b"left_axle"], joints[b"right_axle"]]
+        for link in range(-1, len(joints)):
+            pybullet.setCollisionFilterGroupMask(self.id, link, ROBOT_GROUP, ROBOT_MASK, physicsClientId=client)
+            pybullet.changeDynamics(
+                self.id,
+                link,
+                linearDamping=0,
+                angularDamping=0,
+                jointDamping=0,
+                lateralFriction=self._GRIP if link in self._wheels else 0,
+                rollingFriction=0,
+                spinningFriction=0,
+                restitution=0,
+                activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
+                physicsClientId=client,
+            )
+
+    def place(self, start: Start) -> Pose:
+        """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
+        for wheel in self._wheels:
+            pybullet.resetJointState(self.id, wheel, 0.0, 0.0, physicsClientId=self._client)
+        return _place(self.id, start, self._client)
+
+    def drive(self, left: float, right: float) -> Pose:
+        """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
+        pybullet.setJointMotorControlArray(
+            self.id,
+            self._wheels,
+            pybullet.VELOCITY_CONTROL,
+            targetVelocities=[left / WHEEL_RADIUS, right / WHEEL_RADIUS],
+            forces=[self._TORQUE, self._TORQUE],
+            physicsClientId=self._client,
+        )
+        pybullet.stepSimulation(self._client)
+        return _pose(self.id, self._client)
+
+
+BODIES: dict[str, type[PlanarBody] | type[WheeledBody]] = {"planar": PlanarBody, "wheeled": WheeledBody}
+"""Bodies by name."""
+
+
+def find_body(body: str) -> type[PlanarBody] | type[WheeledBody]:
+    """Look a body up by name. Raises `ValueError` listing the known names."""
+    if body not in BODIES:
+        raise ValueError(f"unknown body {body!r}; expected one of {sorted(BODIES)}")
+    return BODIES[body]
+
+
+def _place(body: int, start: Start, client: int) -> Pose:
+    upright = [0.0, 0.0, math.sin(start.heading / 2), math.cos(start.heading / 2)]
+    pybullet.resetBasePositionAndOrientation(body, [start.x, start.y, HEIGHT], upright, client)
+    pybullet.resetBaseVelocity(body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), client)
+    return _pose(body, client)
+
+
+def _pose(body: int, client: int) -> Pose:
+    (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(body, client)
+    # The direction of the body's x axis seen from above; a tilting body shortens it.
+    cos, sin = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy + qw * qz)
+    length = math.sqrt(cos * cos + sin * sin)
+    return x, y, cos / length, sin / length

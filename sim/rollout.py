@@ -1,0 +1,295 @@
+"""A policy driven from seeded starts: many robots a process, the policy asked once a tick for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
+from contextlib import nullcontext
+from dataclasses import dataclass, fields
+from multiprocessing import get_context
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.corral import Arena, find_arena
+from sim.fleet import Fleet, State, check_commands, control_steps
+from sim.result import Rollout, Steps
+from sim.robot import ACTUATORS, CONTROL_HZ, find_body
+from sim.sensors import SENSORS
+from sim.tracker import DWELL_SECONDS, Tracker
+
+
+class Policy(Protocol):
+    """Whatever turns readings into commands. For several workers it must be picklable."""
+
+    def __call__(
+        self, sensors: NDArray[np.float64], episodes: NDArray[np.int64], steps: NDArray[np.int64], /
+    ) -> NDArray[np.float64]:
+        """Commands `[B, 2]` for readings `[B, 3]`; `episodes` and `steps` `[B]` say whose readings they are.
+
+        A random or stateful policy that keys what it draws or keeps by episode and step is the same at any batch
+        size. Rows are independent robots, and their number changes from tick to tick.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class _Task:
+    """What a worker needs to drive a run of episodes."""
+
+    policy: Policy
+    arena: Arena
+    body: str
+    seed: int
+    steps: int
+    dwell_steps: int
+    robots: int
+    record: bool
+
+
+def rollout(
+    policy: Policy,
+    arena: str | Arena = "default",
+    body: str = "planar",
+    episodes: Iterable[int] = range(200),
+    seed: int = 0,
+    seconds: float = 60.0,
+    dwell: float = DWELL_SECONDS,
+    robots: int = 64,
+    executor: Executor | None = None,
+    workers: int = 1,
+    record: bool = True,
+    progress: Callable[[int], object] | None = None,
+) -> Rollout:
+    """Drive `policy` through `episodes` and report what happened.
+
+    An episode ends at success (at the lamp throughout `dwell` seconds) or after `seconds`. Control runs at 20 Hz.
+    Commands outside [-1, 1] are clipped. The same arguments give the same bits, whatever `robots`, `workers` and
+    `executor` (as long as the policy's rows do not depend on each other).
+
+    Args:
+        policy: readings `[B, 3]`, episodes `[B]`, steps `[B]` -> commands `[B, 2]`; see `Policy`.
+        arena: a name in `sim.ARENAS`, or an `Arena`.
+        body: a name in `sim.BODIES`.
+        episodes: distinct numbers, 0 or more; each stands for one start and one sequence of wheel noise.
+        seed: of all episodes together, 0 or more.
+        seconds: longest duration of an episode.
+        dwell: time at the lamp that makes a success.
+        robots: robots per process, about 29 MB each.
+        executor: where to run, to be reused over calls; the caller shuts it down.
+        workers: contiguous chunks of episodes are spread over this many processes; without an executor, more than
+            one starts a pool for this call.
+        record: keep every control step.
+        progress: called with the number of newly finished episodes.
+
+    Raises:
+        ValueError: an unknown arena or body, no episodes, repeated or negative ones, a number out of range; or
+            commands that are not finite or have the wrong shape, naming episode and step.
+    """
+    numbers = _check_episodes(episodes)
+    if robots < 1 or workers < 1:
+        raise ValueError(f"robots={robots}, workers={workers}: expected both to be at least 1")
+    if seed < 0:
+        raise ValueError(f"seed {seed}: expected 0 or more")
+    find_body(body)
+    task = _Task(policy, find_arena(arena), body, seed, control_steps(seconds), control_steps(dwell), robots, record)
+    if executor is None and workers == 1:
+        parts = [_drive(task, numbers, progress)]
+    else:
+        parts = _spread(task, numbers, executor, workers, progress)
+    merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    trajectory = Steps(**{field.name: merged.pop(f"row_{field.name}") for field in fields(Steps)})
+    lengths = merged["steps"] if record else np.zeros(len(numbers), dtype=np.int64)
+    return Rollout(
+        arena=task.arena,
+        body=body,
+        seed=seed,
+        seconds=seconds,
+        dwell_seconds=dwell,
+        trajectory=trajectory,
+        offsets=np.concatenate([[0], np.cumsum(lengths)]),
+        **merged,
+    )
+
+
+def _check_episodes(episodes: Iterable[int]) -> NDArray[np.int64]:
+    numbers = np.array(list(episodes))
+    if numbers.ndim != 1 or numbers.size == 0 or not np.issubdtype(numbers.dtype, np.integer):
+        raise ValueError(f"episodes {episodes!r}; expected at least one whole number")
+    if numbers.min() < 0:
+        raise ValueError(f"episode {numbers.min()}; expected 0 or more")
+    values, counts = np.unique(numbers, return_counts=True)
+    if counts.max() > 1:
+        raise ValueError(f"episode {values[counts > 1][0]} is asked for {counts.max()} times; expected once")
+    return numbers.astype(np.int64)
+
+
+def _spread(
+    task: _Task,
+    numbers: NDArray[np.int64],
+    executor: Executor | None,
+    workers: int,
+    progress: Callable[[int], object] | None,
+) -> list[dict[str, NDArray[Any]]]:
+    # A few chunks per worker keep the workers evenly busy and the progress moving; below a full fleet they waste time.
+    chunks = max(min(workers, len(numbers)), min(4 * workers, len(numbers) // task.robots))
+    # Not forked: a child must not inherit the parent's threads and physics clients.
+    own = ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if executor is None else None
+    with own if own is not None else nullcontext(executor) as pool:
+        assert pool is not None
+        futures = [pool.submit(_drive, task, chunk) for chunk in np.array_split(numbers, chunks)]
+        try:
+            for future in as_completed(futures):
+                finished = len(future.result()["episode"])
+                if progress is not None:
+                    progress(finished)
+        except BaseException:
+            for future in futures:
+                future.cancel()
+            raise
+        return [future.result() for future in futures]
+
+
+def _drive(
+    task: _Task, numbers: NDArray[np.int64], progress: Callable[[int], object] | None = None
+) -> dict[str, NDArray[Any]]:
+    """Drive the episodes in this process; columns per episode, and per control step under `row_...`."""
+    size = min(task.robots, len(numbers))
+    tracker = Tracker(size, task.dwell_steps)
+    episodes = _Episodes(numbers)
+    rows = _Rows(task.record)
+    with Fleet(size, task.arena, task.body, task.seed) as fleet:
+        place = np.arange(size)  # the position in `numbers` of each slot's episode
+        for slot in range(size):
+            start = fleet.reset(slot, int(numbers[slot]))
+            episodes.start[slot] = start.x, start.y, start.heading
+        waiting = size
+        slots = np.arange(size)
+        while slots.size:
+            state = fleet.observe(slots.tolist())
+            tracker.observe(slots, state)
+            done = tracker.success[slots] | (tracker.clock[slots] >= task.steps)
+            for slot in slots[done].tolist():
+                episodes.finish(int(place[slot]), tracker, slot)
+            going = slots[~done]
+            if going.size:
+                sensors, step = state.sensors[~done], tracker.clock[going]
+                # The policy gets a copy: what it does to its readings must not change the record.
+                answer = task.policy(sensors.copy(), numbers[place[going]], step.copy())
+                commands = _check(answer, numbers[place[going]], step)
+                reached = tracker.first[going] >= 0
+                contact, at_lamp = state.contact[~done], state.at_lamp[~done]
+                episodes.count(place[going], contact, at_lamp, reached)
+                rows.add(place[going], step, state, ~done, commands, reached)
+                fleet.drive(going.tolist(), commands)
+            finished = slots[done]
+            refilled = finished[: len(numbers) - waiting]
+            for slot in refilled.tolist():
+                tracker.reset(slot)
+                start = fleet.reset(slot, int(numbers[waiting]))
+                episodes.start[waiting] = start.x, start.y, start.heading
+                place[slot] = waiting
+                waiting += 1
+            slots = np.sort(np.concatenate([going, refilled]))
+            if progress is not None and finished.size:
+                progress(int(finished.size))
+    return episodes.columns() | rows.columns()
+
+
+def _check(answer: object, episodes: NDArray[np.int64], steps: NDArray[np.int64]) -> NDArray[np.float64]:
+    where = f"episode {episodes[0]}, step {steps[0]}"
+    try:
+        commands = check_commands(answer, len(episodes))
+    except (TypeError, ValueError) as error:
+        raise ValueError(f"{where}: {error}") from error
+    bad = ~np.isfinite(commands).all(axis=1)
+    if bad.any():
+        row = int(np.argmax(bad))
+        names = ", ".join(name for name, *_ in ACTUATORS)
+        raise ValueError(
+            f"episode {episodes[row]}, step {steps[row]}: the policy commanded {commands[row].tolist()} ({names}); "
+            "expected finite numbers"
+        )
+    return commands
+
+
+class _Episodes:
+    """Columns of one row per episode, filled as episodes end."""
+
+    def __init__(self, numbers: NDArray[np.int64]) -> None:
+        size = len(numbers)
+        self.episode = numbers
+        self.success = np.zeros(size, dtype=np.bool_)
+        self.escaped = np.zeros(size, dtype=np.bool_)
+        self.time_to_light = np.full(size, np.nan)
+        self.steps = np.zeros(size, dtype=np.int64)
+        self.start = np.zeros((size, 3))
+        self._contacts = np.zeros(size, dtype=np.int64)
+        self._at_lamp = np.zeros(size, dtype=np.int64)
+        self._reached = np.zeros(size, dtype=np.int64)
+
+    def count(
+        self,
+        places: NDArray[np.int64],
+        contact: NDArray[np.bool_],
+        at_lamp: NDArray[np.bool_],
+        reached: NDArray[np.bool_],
+    ) -> None:
+        self._contacts[places] += contact
+        self._at_lamp[places] += at_lamp
+        self._reached[places] += reached
+
+    def finish(self, place: int, tracker: Tracker, slot: int) -> None:
+        self.success[place] = tracker.success[slot]
+        self.escaped[place] = tracker.escaped[slot]
+        self.steps[place] = tracker.clock[slot]
+        if tracker.first[slot] >= 0:
+            self.time_to_light[place] = tracker.first[slot] / CONTROL_HZ
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        dwell = np.full(len(self.episode), np.nan)
+        np.divide(self._at_lamp, self._reached, out=dwell, where=self._reached > 0)
+        return {
+            "episode": self.episode,
+            "success": self.success,
+            "escaped": self.escaped,
+            "time_to_light": self.time_to_light,
+            "steps": self.steps,
+            "dwell": dwell,
+            "collisions": self._contacts / self.steps,
+            "start": self.start,
+        }
+
+
+class _Rows:
+    """Columns of one row per control step, gathered tick by tick."""
+
+    def __init__(self, record: bool) -> None:
+        self._record = record
+        self._ticks: list[tuple[NDArray[Any], ...]] = []
+
+    def add(
+        self,
+        places: NDArray[np.int64],
+        step: NDArray[np.int64],
+        state: State,
+        chosen: NDArray[np.bool_],
+        commands: NDArray[np.float64],
+        reached: NDArray[np.bool_],
+    ) -> None:
+        if self._record:
+            seen = (state.x, state.y, state.heading, state.sensors)
+            touch = (state.contact, state.at_lamp)
+            before, after = (tuple(column[chosen] for column in group) for group in (seen, touch))
+            self._ticks.append((places, step, *before, commands.copy(), *after, reached))
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        names = ("step", "x", "y", "heading", "sensors", "commands", "contact", "at_lamp", "reached")
+        if not self._ticks:
+            shapes = {"sensors": (0, len(SENSORS)), "commands": (0, len(ACTUATORS))}
+            kinds: dict[str, Any] = {"step": np.int64} | dict.fromkeys(names[-3:], np.bool_)
+            return {f"row_{name}": np.zeros(shapes.get(name, 0), kinds.get(name, np.float64)) for name in names}
+        places, *columns = (np.concatenate(column) for column in zip(*self._ticks, strict=True))
+        order = np.lexsort((columns[0], places))
+        return {f"row_{name}": column[order] for name, column in zip(names, columns, strict=True)}

@@ -1,0 +1,53 @@
+"""The teacher: five if-else rules on thresholded readings.
+
+Source: the corral-escape rules that Neubert et al. 2016 print in section IV, after Levy et al. 2014.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim.sensors import LIGHT_MAX, SENSORS
+
+OBSTACLE = 0.22
+"""An obstacle is sensed below this distance, m. No edge of 16, 20, 24, 32, 48 or 64 equal bins over the sensor's range
+lies on it, so a learner that bins the range equally is not handed the threshold."""
+
+RULES: tuple[str, ...] = ("stay_in_light", "turn_left_to_light", "turn_right_to_light", "avoid_obstacle", "cruise")
+"""The rules in order; the first whose condition holds fires."""
+
+BEHAVIOURS: dict[str, tuple[int, ...]] = {"seek_light": (0, 1, 2), "avoid": (3,), "cruise": (4,)}
+"""The behaviours that the rules make up: name -> indices into `RULES`."""
+
+COMMANDS: NDArray[np.float64] = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+"""What each rule commands `[5, 2]`: left and right wheel."""
+COMMANDS.flags.writeable = False
+
+
+class Teacher:
+    """The rules as a policy: `teacher(sensors [B, 3]) -> commands [B, 2]`, each command exactly -1 or +1.
+
+    Light is sensed where the reading is below `light_below`, an obstacle where it is below `obstacle_below`.
+    """
+
+    def __init__(self, light_below: float = LIGHT_MAX, obstacle_below: float = OBSTACLE) -> None:
+        self.light_below = light_below
+        self.obstacle_below = obstacle_below
+
+    def rule(self, sensors: NDArray[np.float64]) -> NDArray[np.int64]:
+        """Index into `RULES` of the rule that fires, `[B]`. Raises `ValueError` unless `sensors` is `[B, 3]`."""
+        sensors = np.asarray(sensors, dtype=np.float64)
+        if sensors.ndim != 2 or sensors.shape[1] != len(SENSORS):
+            names = ", ".join(name for name, *_ in SENSORS)
+            raise ValueError(f"sensors have shape {sensors.shape}; expected [B, {len(SENSORS)}] ({names})")
+        left, right = (sensors[:, :2] < self.light_below).T
+        obstacle = sensors[:, 2] < self.obstacle_below
+        dark = np.where(obstacle, 3, 4)
+        return np.where(left, np.where(right, 0, 1), np.where(right, 2, dark)).astype(np.int64)
+
+    def __call__(self, sensors: NDArray[np.float64], *_: Any) -> NDArray[np.float64]:
+        """Commands `[B, 2]` for `sensors` `[B, 3]`; whatever else a policy is told is not needed."""
+        return COMMANDS[self.rule(sensors)]
