@@ -25,6 +25,8 @@ class VSA(ABC):
     name: str
     elementwise: ClassVar[bool] = True
     """Whether `bind` acts on every dimension by itself."""
+    breaks_ties: bool = False
+    """Whether `bundle` needs the voters themselves, to decide split votes, and not just their sum."""
 
     def __init__(self, dim: int, dtype: torch.dtype) -> None:
         if isinstance(dim, bool) or not isinstance(dim, int) or dim < 1:

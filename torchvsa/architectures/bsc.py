@@ -21,6 +21,7 @@ class BSC(VSA):
     """
 
     name = "BSC"
+    breaks_ties = True
 
     def __init__(self, dim: int, dtype: torch.dtype = torch.bool) -> None:
         if dtype != torch.bool:

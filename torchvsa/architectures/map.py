@@ -47,6 +47,7 @@ class MAP(VSA):
         self.variant = variant
         self.atoms = atoms
         self.name = f"MAP-{variant}"
+        self.breaks_ties = variant == "B"
 
     def config(self) -> dict[str, str | int]:
         """See `VSA.config`; names the atoms too where they are not the default."""
@@ -87,7 +88,7 @@ class MAP(VSA):
         if self.variant == "C":
             return raw.clamp(-1, 1).to(self.dtype)
         if self.variant == "I":
-            return raw
+            return raw.to(self.accumulator) if is_integer(raw) else raw
         return self._signs(raw, torch.roll(torch.where(raw >= 0, 1, -1), 1, -1))
 
     def bundle(

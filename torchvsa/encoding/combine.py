@@ -1,18 +1,21 @@
 """How the role-bound values of one record become one hypervector.
 
 A combination is a small class with three jobs: `bound` makes the table of role-bound values `[n, V, d]`;
-`unobserved` gives the entry that stands, at index V, for a value that was not observed; `join` combines the
-entries `[B, n, d]` of each record.
+`unobserved` gives the entry that stands, at index V, for a value that was not observed; `join` looks up and combines
+the entries of each record.
 """
 
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
 import torch
-from jaxtyping import Bool, Shaped
+from jaxtyping import Int, Shaped
 from torch import Tensor
 
 from torchvsa.architectures import VSA
+
+_SIDE_BY_SIDE = 2**24
+"""Elements of looked-up entries held at once where all of a record's entries are needed together."""
 
 
 class Combination(ABC):
@@ -37,10 +40,8 @@ class Combination(ABC):
         """The entry that stands for a value that was not observed, and leaves the others as they are."""
 
     @abstractmethod
-    def join(
-        self, entries: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """The record of each row."""
+    def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
+        """The record of each row of indices into the table (-1, the last entry, is unobserved)."""
 
 
 class Bundled(Combination):
@@ -55,11 +56,20 @@ class Bundled(Combination):
         """Zero (its weight is zero as well, so that it has no vote)."""
         return torch.zeros_like(like[0, 0])
 
-    def join(
-        self, entries: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
-    ) -> Shaped[Tensor, "batch d"]:
+    def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Bundle those that were observed."""
-        return self.vsa.bundle(entries, weights=observed.to(torch.int32))
+        if self.vsa.breaks_ties:
+            # The voters themselves decide ties, so they are needed side by side: some rows at a time.
+            sensors = torch.arange(len(table), device=table.device)
+            rows = max(_SIDE_BY_SIDE // table[:, 0].numel(), 1)
+            blocks = [self.vsa.bundle(table[sensors, b], weights=(b >= 0).int()) for b in indices.split(rows)]
+            return torch.cat(blocks)
+        # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
+        wide = self.vsa.dtype if len(table) < 128 else self.vsa.accumulator
+        total = table[0][indices[:, 0]].to(wide)
+        for sensor in range(1, len(table)):
+            total = total + table[sensor][indices[:, sensor]]
+        return self.vsa.normalize(total)
 
 
 class Bound(Combination):
@@ -92,13 +102,11 @@ class Bound(Combination):
         """The identity of binding."""
         return self.vsa.identity().to(like)
 
-    def join(
-        self, entries: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
-    ) -> Shaped[Tensor, "batch d"]:
+    def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Bind all."""
-        record = entries[:, 0]
-        for sensor in range(1, entries.shape[1]):
-            record = self.vsa.bind(record, entries[:, sensor])
+        record = table[0][indices[:, 0]]
+        for sensor in range(1, len(table)):
+            record = self.vsa.bind(record, table[sensor][indices[:, sensor]])
         return record
 
 

@@ -68,8 +68,7 @@ class Record(nn.Module):
             raise ShapeError(
                 f"indices must be [batch, {self.sensors}], one column per sensor; got {tuple(indices.shape)}"
             )
-        entries = self.table[torch.arange(self.sensors, device=indices.device), indices]
-        return self.combination.join(entries, indices >= 0)
+        return self.combination.join(self.table, indices)
 
 
 def _accepted(name: str, part: Callable[..., Any], **options: int | None) -> dict[str, int]:
