@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import sim
 from behaviours import Behaviour, Demonstrations, Policy, Space
-from behaviours.learning.samples import distinct_rows
+from behaviours.ordered import distinct_rows
 from experiments.presets import schema
 
 if TYPE_CHECKING:

@@ -1,5 +1,6 @@
 """Every config composes, and every preset can be built."""
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any, cast
 
@@ -8,13 +9,12 @@ import pytest
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 
-import experiments.conf
 import sim
 from behaviours import Demonstrations
 from experiments import presets
 from experiments.controllers import CONTROLLERS, check_names
 
-CONF = Path(next(iter(experiments.conf.__path__)))
+CONF = Path(next(iter(import_module("experiments.conf").__path__)))
 OPTIONS = sorted(
     f"{path.parent.relative_to(CONF)}={path.stem}" for path in CONF.rglob("*/*.yaml") if path.parent != CONF
 )
