@@ -103,10 +103,14 @@ class Arena:
 ARENAS: dict[str, Arena] = {
     "default": Arena(),
     "narrow": Arena(gap=0.7),
-    "offset_lamp": Arena(lamp_offset=0.6),
-    "large": Arena(side=3.6),
+    "offset_lamp": Arena(lamp_offset=1.0),
+    "large": Arena(side=4.8),
 }
-"""Arenas by name: the default is one that its teacher solves; the others are harder in one respect each."""
+"""Arenas by name: the default is one that its teacher solves; the others are harder in one respect each.
+
+Measured over 200 starts, teacher's success, planar and wheeled: `narrow` 1.00 and .84 (wheels catch on the edge of the
+gap), `offset_lamp` .98 and .96 (some leave and miss the lamp), `large` .99 and .99, half as long again on the way.
+"""
 
 
 def find_arena(arena: str | Arena) -> Arena:

@@ -167,8 +167,8 @@ def _check_fit(arena: Arena) -> None:
         raise ValueError(f"Arena.gap is {arena.gap} m; the robot is {2 * RADIUS} m wide and needs more to get out")
     if not HEIGHT < arena.lamp_height < SENSOR_HEIGHT < arena.wall_height:
         raise ValueError(
-            f"Arena.lamp_height is {arena.lamp_height} m and wall_height {arena.wall_height} m; the lamp must be higher "
-            f"than the robot's centre ({HEIGHT} m) and lower than its beams ({SENSOR_HEIGHT} m), the walls higher"
+            f"Arena.lamp_height is {arena.lamp_height} m and wall_height {arena.wall_height} m; the lamp must be "
+            f"higher than the robot's centre ({HEIGHT} m) and lower than its beams ({SENSOR_HEIGHT} m), walls higher"
         )
 
 

@@ -104,11 +104,11 @@ class PlanarBody:
             activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
             physicsClientId=client,
         )
-        self._pose = _pose(self.id, client)
+        self._pose, self._sunk = _pose(self.id, client)
 
     def place(self, start: Start) -> Pose:
         """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
-        self._pose = _place(self.id, start, self._client)
+        self._pose, self._sunk = _place(self.id, start, self._client)
         return self._pose
 
     def drive(self, left: float, right: float) -> Pose:
@@ -118,12 +118,14 @@ class PlanarBody:
         step = turn / (CONTROL_HZ * self._SUBSTEPS)
         # Each physics step goes straight along the middle heading of its arc.
         heading = math.atan2(self._pose[3], self._pose[2]) + step / 2
+        # Contact normals are horizontal up to rounding: unless undone, minutes against the lamp add up to millimetres.
+        rise = self._sunk * CONTROL_HZ
         for _ in range(self._SUBSTEPS):
-            velocity = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
+            velocity = (speed * math.cos(heading), speed * math.sin(heading), rise)
             pybullet.resetBaseVelocity(body, velocity, (0.0, 0.0, turn), client)
             pybullet.stepSimulation(client)
             heading += step
-        self._pose = _pose(body, client)
+        self._pose, self._sunk = _pose(body, client)
         return self._pose
 
 
@@ -182,7 +184,7 @@ class WheeledBody:
         """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
         for wheel in self._wheels:
             pybullet.resetJointState(self.id, wheel, 0.0, 0.0, physicsClientId=self._client)
-        return _place(self.id, start, self._client)
+        return _place(self.id, start, self._client)[0]
 
     def drive(self, left: float, right: float) -> Pose:
         """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
@@ -195,7 +197,7 @@ class WheeledBody:
             physicsClientId=self._client,
         )
         pybullet.stepSimulation(self._client)
-        return _pose(self.id, self._client)
+        return _pose(self.id, self._client)[0]
 
 
 BODIES: dict[str, type[PlanarBody] | type[WheeledBody]] = {"planar": PlanarBody, "wheeled": WheeledBody}
@@ -209,16 +211,17 @@ def find_body(body: str) -> type[PlanarBody] | type[WheeledBody]:
     return BODIES[body]
 
 
-def _place(body: int, start: Start, client: int) -> Pose:
+def _place(body: int, start: Start, client: int) -> tuple[Pose, float]:
     upright = [0.0, 0.0, math.sin(start.heading / 2), math.cos(start.heading / 2)]
     pybullet.resetBasePositionAndOrientation(body, [start.x, start.y, HEIGHT], upright, client)
     pybullet.resetBaseVelocity(body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), client)
     return _pose(body, client)
 
 
-def _pose(body: int, client: int) -> Pose:
-    (x, y, _), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(body, client)
+def _pose(body: int, client: int) -> tuple[Pose, float]:
+    """The pose, and how far the body's centre is below its height."""
+    (x, y, z), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(body, client)
     # The direction of the body's x axis seen from above; a tilting body shortens it.
     cos, sin = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy + qw * qz)
     length = math.sqrt(cos * cos + sin * sin)
-    return x, y, cos / length, sin / length
+    return (x, y, cos / length, sin / length), HEIGHT - z

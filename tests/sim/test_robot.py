@@ -1,0 +1,130 @@
+import math
+
+import numpy as np
+import pybullet
+import pytest
+
+import sim
+from sim.corral import Start
+from sim.fleet import TOUCH, Fleet, World
+from sim.robot import CONTROL_HZ, HEIGHT, MAX_SPEED, RADIUS, TRACK, find_body
+
+ARENA = sim.Arena(side=3.0, gap=1.0, lamp_beyond=0.8)
+BODIES = ["planar", "wheeled"]
+
+
+def height(world: World) -> float:
+    return pybullet.getBasePositionAndOrientation(world.body.id, world.client)[0][2]
+
+
+@pytest.mark.parametrize(("body", "slack"), [("planar", 1e-9), ("wheeled", 0.04)])
+def test_equal_wheels_go_straight_at_full_speed(body: str, slack: float) -> None:
+    with World(ARENA, body) as world:
+        x, y, cos, _ = world.body.place(Start(-1.2, 0.3, 0.0))
+        for _ in range(2 * CONTROL_HZ):
+            x, y, cos, _ = world.body.drive(MAX_SPEED, MAX_SPEED)
+    assert x == pytest.approx(-1.2 + 2 * MAX_SPEED, abs=slack)
+    assert y == pytest.approx(0.3, abs=slack / 4)
+    assert cos == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize(("body", "slack"), [("planar", 1e-9), ("wheeled", 0.3)])
+def test_opposite_wheels_turn_on_the_spot(body: str, slack: float) -> None:
+    with World(ARENA, body) as world:
+        x, y, cos, sin = world.body.place(Start(0.0, 0.0, 0.2))
+        turned = 0.0
+        for _ in range(20):
+            before = math.atan2(sin, cos)
+            x, y, cos, sin = world.body.drive(-MAX_SPEED, MAX_SPEED)
+            turned += (math.atan2(sin, cos) - before) % (2 * math.pi)
+    assert turned == pytest.approx(2 * MAX_SPEED / TRACK, abs=slack + 1e-6)
+    assert math.hypot(x, y) < max(slack / 30, 1e-9)
+
+
+def test_the_planar_body_follows_the_arc_of_its_wheels() -> None:
+    left, right = 0.3, 0.4
+    with World(ARENA, "planar") as world:
+        x, y, _, _ = world.body.place(Start(0.0, 0.0, 0.0))
+        for _ in range(CONTROL_HZ):
+            x, y, _, _ = world.body.drive(left, right)
+    turn, radius = (right - left) / TRACK, (left + right) / 2 / ((right - left) / TRACK)
+    assert x == pytest.approx(radius * math.sin(turn), abs=1e-4)
+    assert y == pytest.approx(radius * (1 - math.cos(turn)), abs=1e-4)
+
+
+@pytest.mark.parametrize("body", BODIES)
+@pytest.mark.parametrize("heading", [math.pi, math.pi / 2, -2.0, 2.4])
+def test_no_robot_drives_through_a_wall(body: str, heading: float) -> None:
+    with World(ARENA, body) as world:
+        x, y, _, _ = world.body.place(Start(0.0, 0.0, heading))
+        for _ in range(15 * CONTROL_HZ):
+            x, y, _, _ = world.body.drive(MAX_SPEED, MAX_SPEED)
+            assert max(abs(x), abs(y)) <= 1.5 - RADIUS + 0.003
+    assert max(abs(x), abs(y)) >= 1.5 - RADIUS - TOUCH
+
+
+def test_the_planar_body_never_leaves_its_plane() -> None:
+    commands = np.random.default_rng(0).choice([-1.0, 1.0], (80, 2))
+    with World(ARENA, "planar") as world:
+        for start in (Start(1.2, 1.2, 0.7), Start(-1.1, 0.0, 3.0), Start(1.7, 0.05, 0.0)):
+            world.body.place(start)
+            for left, right in commands.repeat(10, axis=0).tolist():
+                world.body.drive(left * MAX_SPEED * 1.9, right * MAX_SPEED * 1.9)
+                assert height(world) == pytest.approx(HEIGHT, abs=1e-5)
+            _, rotation = pybullet.getBasePositionAndOrientation(world.body.id, world.client)
+            assert np.abs(rotation[:2]).max() < 1e-6
+
+
+def test_a_minute_against_the_lamp_does_not_lift_the_planar_body() -> None:
+    with Fleet(1, ARENA, "planar") as fleet:
+        fleet.reset(0, 0)
+        fleet._poses[0] = fleet.worlds[0].body.place(Start(1.9, 0.02, 0.0))
+        teacher = sim.Teacher()
+        for _ in range(60 * CONTROL_HZ):
+            fleet.drive([0], teacher(fleet.observe([0]).sensors))
+        assert height(fleet.worlds[0]) == pytest.approx(HEIGHT, abs=1e-5)
+
+
+def test_the_wheeled_body_stays_on_the_floor() -> None:
+    with World(ARENA, "wheeled") as world:
+        world.body.place(Start(0.5, 1.0, 0.3))
+        for step in range(300):
+            world.body.drive(MAX_SPEED, MAX_SPEED if step // 40 % 2 else -MAX_SPEED)
+            assert height(world) == pytest.approx(HEIGHT, abs=0.003)
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_robot_that_faces_the_lamp_comes_to_rest_against_it_and_stays(body: str) -> None:
+    with Fleet(1, ARENA, body) as fleet:
+        fleet.reset(0, 0)
+        fleet._poses[0] = fleet.worlds[0].body.place(Start(1.0, 0.1, 0.0))
+        teacher, touching = sim.Teacher(), []
+        state = fleet.observe([0])
+        for _ in range(20 * CONTROL_HZ):
+            fleet.drive([0], teacher(state.sensors))
+            state = fleet.observe([0])
+            touching.append(bool(state.at_lamp[0]))
+        assert math.hypot(state.x[0] - 2.3, state.y[0]) == pytest.approx(RADIUS + ARENA.lamp_radius, abs=TOUCH)
+    first = touching.index(True)
+    assert first < 5 * CONTROL_HZ
+    assert np.mean(touching[first:]) > 0.95
+
+
+@pytest.mark.parametrize("body", BODIES)
+def test_a_placed_robot_behaves_as_a_new_one(body: str) -> None:
+    def path(world: World, start: Start, steps: int) -> list[tuple[float, ...]]:
+        poses = [world.body.place(start)]
+        return poses + [world.body.drive(0.4, 0.3 if step // 20 % 2 else -0.1) for step in range(steps)]
+
+    start = Start(-1.2, 1.2, 2.0)
+    with World(ARENA, body) as new:
+        expected = path(new, start, 200)
+    with World(ARENA, body) as used:
+        # It has been pressed into the very corner that the episode starts in, and is moving.
+        path(used, Start(-1.25, 1.25, 2.3), 33)
+        assert path(used, start, 200) == expected
+
+
+def test_unknown_bodies_are_named() -> None:
+    with pytest.raises(ValueError, match=r"unknown body 'flying'.*'planar', 'wheeled'"):
+        find_body("flying")
