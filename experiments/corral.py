@@ -222,7 +222,8 @@ def print_table(results: Results, console: Console) -> None:
     for title in (*titles, "unseen", "pairs", "bins", "µs"):
         table.add_column(title, justify="left" if title == "controller" else "right", no_wrap=True)
     for row in results.table:
-        cells = {key: _cell(value) for key, value in row.items()}
+        cells = {key: _cell(value) for key, value in row.items()} | {"query_us": f"{row['query_us']:.0f}"}
+        cells["time_to_light_s"] = cells["time_to_light_s"][:4]
         low, high = cells.pop("success_low"), cells.pop("success_high")
         cells["success_rate"] += f" [{low}, {high}]"
         table.add_row(*cells.values())
@@ -232,7 +233,7 @@ def print_table(results: Results, console: Console) -> None:
 def _cell(value: object) -> str:
     if value is None:
         return "-"
-    return f"{value:.3f}"[:5] if isinstance(value, float) else str(value)
+    return f"{value:.3f}" if isinstance(value, float) else str(value)
 
 
 @contextmanager
@@ -252,7 +253,7 @@ def run(cfg: DictConfig) -> None:
     """One job."""
     console = Console()
     if not console.is_terminal:
-        console.width = 140  # a file has no width of its own; the table needs this much
+        console.width = 150  # a file has no width of its own; the table needs this much
     config = cast(dict[str, Any], OmegaConf.to_container(cfg, resolve=True))
     folder = Path(HydraConfig.get().runtime.output_dir)
     if finished(folder, config):
