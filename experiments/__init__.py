@@ -2,8 +2,9 @@
 
 try:
     import hydra as _hydra
-    import pybullet as _pybullet
+
+    import sim as _sim
 except ImportError as error:
     raise ImportError(f"{error.name} is missing; the experiments need: pip install 'torchvsa[corral]'") from error
 
-del _hydra, _pybullet
+del _hydra, _sim

@@ -24,6 +24,8 @@ class Study:
     """What a controller may learn from, and how it may try itself."""
 
     config: Mapping[str, Any]
+    space: Space
+    """The codebooks that the learners of this run share, so that their programs can be added."""
     train: Demonstrations
     fires: NDArray[np.int64]
     """Which of the teacher's rules fired in each row of `train`."""
@@ -115,9 +117,7 @@ def _teacher_wheeled(study: Study) -> Controller:
 
 def _default(study: Study) -> Controller:
     """The rule and the codebooks of this run's settings."""
-    space = presets.space(study.config["vsa"], study.config, study.config["seed"])
-    behaviour = presets.rule(study.config["rule"]).fit(space, study.train)
-    return _learned("default", behaviour)
+    return _learned("default", presets.rule(study.config["rule"]).fit(study.space, study.train))
 
 
 def _paper(study: Study, bins: int | None = None, name: str = "paper") -> Controller:
@@ -147,7 +147,7 @@ def _paper_best_bins(study: Study) -> Controller:
 
 def _bundled(study: Study) -> Controller:
     """Three behaviours, each learned alone where its own rules fire, combined without any further training."""
-    bank = BehaviourBank(presets.space(study.config["vsa"], study.config, study.config["seed"]))
+    bank = BehaviourBank(study.space)
     for name, rules in sim.BEHAVIOURS.items():
         own = torch.from_numpy(np.isin(study.fires, rules))
         if not own.any():

@@ -30,11 +30,12 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from rich.table import Table
 
 import sim
-from behaviours import Demonstrations
+from behaviours import Behaviour, BehaviourBank, Policy, Space
 from experiments import presets
 from experiments.agreement import Agreement, measure
 from experiments.command_line import errors_in_one_line
 from experiments.controllers import CONTROLLERS, Controller, Study, check_names
+from experiments.lessons import from_file, shown_in
 from experiments.results import Results, Row, finished
 
 FIRST_DEMONSTRATION = 1_000_000
@@ -95,25 +96,26 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     # Settings that cannot be built are found before anything is driven.
     reference = presets.space(config["vsa"], config, config["seed"])
     presets.rule(config["rule"])
+    train = None if config["demonstrations_file"] is None else from_file(config["demonstrations_file"])
     with _workers(config["workers"]) as executor, _progress(console) as progress:
         driver = Driver(config, executor, progress)
-        numbers = range(FIRST_DEMONSTRATION, FIRST_DEMONSTRATION + config["demonstrations"])
-        shown = driver.drive("teacher demonstrates", sim.Teacher(), numbers, record=True)
-        train = Demonstrations(shown.trajectory.sensors, shown.trajectory.commands, shown.step_episode)
-        moving = train.where((~shown.trajectory.reached).tolist())
+        if train is None:
+            numbers = range(FIRST_DEMONSTRATION, FIRST_DEMONSTRATION + config["demonstrations"])
+            train, moves = shown_in(driver.drive("teacher demonstrates", sim.Teacher(), numbers, record=True))
+            moving = train.where(moves.tolist())
+        else:
+            moving = train  # a file does not say when the lamp was reached
         validation = range(FIRST_VALIDATION, FIRST_VALIDATION + config["validation_starts"])
         learn_from = Study(
             config,
+            reference,
             train,
             sim.Teacher().rule(train.sensors.numpy()),
             validate=lambda policy: driver.drive("bins for paper_best_bins", policy, validation),
         )
         examined = driver.drive("teacher, held out", sim.Teacher(), range(config["starts"]), record=True)
-        heldout_rows = ~examined.trajectory.reached
-        heldout = Demonstrations(
-            examined.trajectory.sensors, examined.trajectory.commands, examined.step_episode
-        ).where(heldout_rows.tolist())
-        steps = examined.trajectory.step[heldout_rows]
+        heldout, moves = shown_in(examined)
+        heldout, steps = heldout.where(moves.tolist()), examined.trajectory.step[moves]
 
         controllers, rollouts, agreements = {}, {}, {}
         for name in config["controllers"]:
@@ -135,9 +137,23 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
 
     with _progress(console) as progress:
         write_report(folder, results, controllers, rollouts, agreements, moving, heldout, progress)
+    train.save(folder / "demonstrations.safetensors")
+    _bank(reference, controllers).save(folder / "behaviours.safetensors")
     results.wall_time_s = time.perf_counter() - began
     results.write(folder)
     return results
+
+
+def _bank(space: Space, controllers: Mapping[str, Controller]) -> BehaviourBank:
+    """What was learned over the run's codebooks: the default, and the behaviours that were bundled."""
+    bank = BehaviourBank(space)
+    for name, controller in controllers.items():
+        if isinstance(controller.mind, Behaviour) and controller.space is space:
+            bank.add(name, controller.mind)
+        if isinstance(controller.mind, Policy):
+            for part, behaviour in zip(controller.mind.names, controller.mind.parts, strict=True):
+                bank.add(part, behaviour)
+    return bank
 
 
 def _starts(config: Mapping[str, Any], name: str) -> int:

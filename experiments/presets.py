@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import sim
 import torchvsa
@@ -12,10 +12,10 @@ COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
 
 
-def schema() -> Schema:
-    """The corral robot's sensors and actuators. Live readings outside a range are clipped."""
+def schema(beyond: Literal["error", "clip"] = "clip") -> Schema:
+    """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
     return Schema(
-        [Sensor(name, low, high, unit, beyond="clip") for name, low, high, unit in sim.SENSORS],
+        [Sensor(name, low, high, unit, beyond) for name, low, high, unit in sim.SENSORS],
         [Actuator(name, low, high, unit, levels=COMMAND_LEVELS) for name, low, high, unit in sim.ACTUATORS],
     )
 

@@ -1,5 +1,6 @@
 """The corral: a simulated robot, its sensors, its teacher, and rollouts of any policy."""
 
+import sim.quiet  # noqa: F401 (before anything that imports pybullet)
 from sim.corral import ARENAS, Arena, Start, draw_start
 from sim.env import CorralEscapeEnv, CorralEscapeVectorEnv, register
 from sim.result import Rollout, Steps, Summary

@@ -50,12 +50,12 @@ def small_run() -> CorralRun:
         config: Any = OmegaConf.to_container(
             compose("corral", overrides=[*SETTINGS, f"starts={len(STARTS)}"]), resolve=True
         )
+    reference = presets.space(config["vsa"], config, config["seed"])
     shown, shown_moving = _demonstrations(range(1000, 1006))
     heldout, moving = _demonstrations(STARTS)
     train = Demonstrations(shown.trajectory.sensors, shown.trajectory.commands, shown.step_episode)
     # Choosing the bins of `paper_best_bins` is not what is tested, so no candidate is driven.
-    study = Study(config, train, sim.Teacher().rule(train.sensors.numpy()), validate=lambda policy: heldout)
-    reference = presets.space(config["vsa"], config, config["seed"])
+    study = Study(config, reference, train, sim.Teacher().rule(train.sensors.numpy()), validate=lambda policy: heldout)
     steps = heldout.trajectory.step[~heldout.trajectory.reached]
     controllers = {name: make(study) for name, make in CONTROLLERS.items()}
     rollouts = {name: _drive(one.policy, STARTS, one.body or "planar") for name, one in controllers.items()}

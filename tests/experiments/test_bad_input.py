@@ -1,9 +1,22 @@
 """Bad input gets one clear line that names what is wrong, a non-zero exit, and no half-written result."""
 
 from pathlib import Path
+from subprocess import CompletedProcess
 
 import pytest
+import torch
 from commands import SMALL, corral
+
+from behaviours.storage import save_tensors
+
+
+def assert_refused(run: CompletedProcess[str], words: str, folder: Path) -> None:
+    assert run.returncode == 1
+    (line,) = run.stderr.splitlines()
+    assert words in line
+    assert "Traceback" not in run.stdout
+    for unfinished in ("results.json", "report.html", "records.parquet", "behaviours.safetensors"):
+        assert not list(folder.rglob(unfinished))
 
 
 @pytest.mark.parametrize(
@@ -28,13 +41,7 @@ from commands import SMALL, corral
 )
 def test_one_line_names_what_is_wrong(tmp_path: Path, override: str, words: str) -> None:
     run = corral(tmp_path, *SMALL, override)
-    assert run.returncode == 1
-    lines = [line for line in run.stderr.splitlines() if "pybullet build time" not in line]
-    assert len(lines) == 1, run.stderr
-    assert words in lines[0]
-    assert "Traceback" not in run.stdout
-    assert not list(tmp_path.rglob("results.json"))
-    assert not list(tmp_path.rglob("report.html"))
+    assert_refused(run, words, tmp_path)
 
 
 def test_the_traceback_is_there_for_those_who_ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -42,3 +49,27 @@ def test_the_traceback_is_there_for_those_who_ask(tmp_path: Path, monkeypatch: p
     run = corral(tmp_path, *SMALL, "controllers=[nobody]")
     assert run.returncode == 1
     assert "Traceback" in run.stderr
+
+
+READINGS = torch.tensor([[5.0, 5.0, 0.5], [1.0, 1.0, 0.5]], dtype=torch.float64)
+
+
+@pytest.mark.parametrize(
+    ("readings", "words"),
+    [
+        (READINGS[:, :2], "sensor readings must be rows of 3 values (light_left, light_right, distance)"),
+        (READINGS + 1, "sensor 'light_left' reads 6 in row 0; its range is [0, 5] m"),
+        (READINGS * torch.inf, "infinite value in row 0, column 0"),
+        (READINGS[:0], "needs at least one row"),
+        (torch.full_like(READINGS, torch.nan), "row 0 of the demonstration has no observed sensor"),
+    ],
+)
+def test_a_file_of_demonstrations_that_does_not_fit(tmp_path: Path, readings: torch.Tensor, words: str) -> None:
+    shown = tmp_path / "shown.safetensors"
+    tensors = {"sensors": readings, "commands": torch.ones(len(readings), 2, dtype=torch.float64)}
+    save_tensors(shown, "demonstrations", tensors | {"episodes": torch.zeros(len(readings), dtype=torch.int64)}, {})
+    assert_refused(corral(tmp_path, *SMALL, f"demonstrations_file={shown}", "controllers=[default]"), words, tmp_path)
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    assert_refused(corral(tmp_path, "demonstrations_file=nowhere.safetensors"), "nowhere.safetensors", tmp_path)

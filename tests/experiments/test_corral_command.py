@@ -6,8 +6,10 @@ from pathlib import Path
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
+import torch
 from commands import SMALL, corral, only, results, without_timings
 
+from behaviours import BehaviourBank, Demonstrations
 from experiments.corral import COLUMNS
 from experiments.results import collect
 
@@ -102,3 +104,19 @@ def test_a_sweep_of_two_jobs_is_collected_and_not_run_twice(tmp_path: Path) -> N
     assert again.returncode == 0, again.stderr
     assert again.stdout.count("nothing to do") == 2
     assert times == [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("results.json"))]
+
+
+@pytest.mark.slow
+def test_what_was_learned_is_kept_and_can_be_learned_again(finished: tuple[Path, str], tmp_path: Path) -> None:
+    folder, _ = finished
+    bank = BehaviourBank.load(only(folder, "behaviours.safetensors"))
+    assert bank.names == ["default", "seek_light", "avoid", "cruise"]
+    shown = only(folder, "demonstrations.safetensors")
+    demonstrations = Demonstrations.load(shown)
+    assert len(demonstrations.episodes.unique()) == 6
+    run = corral(tmp_path, *SMALL, f"demonstrations_file={shown}", "controllers=[default]", "animate=false")
+    assert run.returncode == 0, run.stderr
+    again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
+    assert torch.equal(again["default"].program, bank["default"].program)
+    agreed = bank["default"](demonstrations.sensors).commands == demonstrations.commands
+    assert agreed.all(-1).double().mean() > 0.95
