@@ -11,22 +11,18 @@ of the teacher (agreement), and then drives by itself from held-out starts (succ
 
 import statistics
 import time
-from collections.abc import Iterator, Mapping
-from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager, nullcontext
+from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, cast
 
 import hydra
 import numpy as np
-import torch
 from hydra.core.hydra_config import HydraConfig
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 import sim
@@ -35,6 +31,7 @@ from experiments import presets
 from experiments.agreement import Agreement, measure
 from experiments.command_line import errors_in_one_line
 from experiments.controllers import CONTROLLERS, Controller, Study, check_names
+from experiments.driving import Driver, progress_bars, workers
 from experiments.lessons import from_file, shown_in
 from experiments.results import Results, Row, finished
 
@@ -61,33 +58,6 @@ COLUMNS = (
 )
 
 
-class Driver:
-    """Drives policies in the run's arena, on all workers, with a progress bar for each drive."""
-
-    def __init__(self, config: Mapping[str, Any], executor: Executor, progress: Progress) -> None:
-        self.config, self.executor, self.progress = config, executor, progress
-        self.arena = presets.arena(config["arena"])
-
-    def drive(
-        self, what: str, policy: sim.Policy, episodes: range, body: str | None = None, record: bool = False
-    ) -> sim.Rollout:
-        """Drive `policy` from the starts of `episodes`."""
-        task = self.progress.add_task(what, total=len(episodes))
-        return sim.rollout(
-            policy,
-            arena=self.arena,
-            body=body or self.config["body"]["name"],
-            episodes=episodes,
-            seed=self.config["seed"],
-            seconds=self.config["seconds"],
-            robots=self.config["robots"],
-            executor=self.executor,
-            workers=self.config["workers"],
-            record=record,
-            progress=lambda count: self.progress.advance(task, count),
-        )
-
-
 def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     """Run the whole comparison and write it to `folder`."""
     began = time.perf_counter()
@@ -97,7 +67,7 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     reference = presets.space(config["vsa"], config, config["seed"])
     presets.rule(config["rule"])
     train = None if config["demonstrations_file"] is None else from_file(config["demonstrations_file"])
-    with _workers(config["workers"]) as executor, _progress(console) as progress:
+    with workers(config["workers"]) as executor, progress_bars(console) as progress:
         driver = Driver(config, executor, progress)
         if train is None:
             numbers = range(FIRST_DEMONSTRATION, FIRST_DEMONSTRATION + config["demonstrations"])
@@ -135,7 +105,7 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
 
     from experiments.corral_report import write_report  # matplotlib is slow to load, and only needed here
 
-    with _progress(console) as progress:
+    with progress_bars(console) as progress:
         write_report(folder, results, controllers, rollouts, agreements, moving, heldout, progress)
     train.save(folder / "demonstrations.safetensors")
     _bank(reference, controllers).save(folder / "behaviours.safetensors")
@@ -250,18 +220,6 @@ def _cell(value: object) -> str:
     if value is None:
         return "-"
     return f"{value:.3f}" if isinstance(value, float) else str(value)
-
-
-@contextmanager
-def _workers(count: int) -> Iterator[Executor]:
-    # Spawned, so that a worker inherits no threads and no physics clients; one thread each, as there are several.
-    with ProcessPoolExecutor(count, get_context("spawn"), torch.set_num_threads, (1,)) as pool:
-        yield pool
-
-
-def _progress(console: Console) -> Progress:
-    columns = (TextColumn("{task.description:>28}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    return Progress(*columns, console=console)
 
 
 @hydra.main(version_base="1.3", config_path="pkg://experiments.conf", config_name="corral")
