@@ -43,7 +43,7 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     return a.to(wide) @ b.to(wide).T
 
 
-def paired_dots(a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
+def paired_dots(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
     """The inner product of a with b, element by element of the (broadcast) batch; exact for integers."""
     a, b = signed(a), signed(b)
     if a.is_complex() or b.is_complex():

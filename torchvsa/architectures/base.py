@@ -74,11 +74,13 @@ class VSA(ABC):
         """The hypervector that leaves others as they are when bound."""
 
     @abstractmethod
-    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """Join two hypervectors into one that is dissimilar to both. Commutes and is linear in each argument."""
 
     @abstractmethod
-    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def unbind(
+        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Undo `bind`: `unbind(bind(a, key), key)` is (or resembles) `a`."""
 
     @abstractmethod
@@ -87,7 +89,9 @@ class VSA(ABC):
 
     # -- what follows from it --------------------------------------------------------------------------
 
-    def permute(self, x: Shaped[Tensor, "*batch d"], shifts: int | Int[Tensor, "*batch"]) -> Shaped[Tensor, "*batch d"]:
+    def permute(
+        self, x: Shaped[Tensor, "*#batch d"], shifts: int | Int[Tensor, "*#batch"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Rotate the elements to the right: element `i` moves to `(i + shift) mod d`.
 
         `shifts` is one number, or a tensor with one for each hypervector (any shape that broadcasts with the
@@ -109,8 +113,8 @@ class VSA(ABC):
         return windows[torch.arange(len(rows), device=x.device), starts].reshape(*batch, self.dim)
 
     def superpose(
-        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "..."]:
         """Sum `k` hypervectors over dimension `dim` into a raw accumulator.
 
         `weights` holds one number per summand: `[k]`, or `[*batch, k]` for one in each batch element too. Integer
@@ -139,8 +143,8 @@ class VSA(ABC):
         return votes.sum(dim, dtype=self.accumulator if is_integer(votes) else None)
 
     def bundle(
-        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "..."]:
         """Superpose `k` hypervectors into one that is similar to each of them: sum in one step, then normalise.
 
         Order-free, but not associative: bundle all at once, or keep a raw accumulator.
@@ -148,7 +152,7 @@ class VSA(ABC):
         """
         return self.normalize(self.superpose(xs, dim, weights))
 
-    def similarity(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
+    def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
         """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
         self.check(a, "a")
         self.check(b, "b")
@@ -159,8 +163,8 @@ class VSA(ABC):
         return (x.real if x.is_complex() else signed(x)) > 0
 
     def separate(
-        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate `x` from `bundle([x, known])`, given `known`."""
         return bundled - known
 

@@ -38,7 +38,7 @@ class BSC(VSA):
         """No bit set."""
         return torch.zeros(self.dim, dtype=torch.bool)
 
-    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """XOR; with a raw accumulator, its votes are negated where the other's bit is set."""
         self.check(a, "a")
         self.check(b, "b")
@@ -46,7 +46,9 @@ class BSC(VSA):
             return a ^ b
         return signed(a) * signed(b)
 
-    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def unbind(
+        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """XOR again, an exact inverse."""
         return self.bind(bound, key)
 
@@ -55,8 +57,8 @@ class BSC(VSA):
         return self._majority(raw, torch.roll(raw < 0, 1, -1))
 
     def bundle(
-        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "..."]:
         """See `VSA.bundle`: the majority of the bits."""
         raw = self.superpose(xs, dim, weights)
         if (voters := first_two(xs, dim, weights)) is None:
@@ -68,8 +70,8 @@ class BSC(VSA):
         return torch.where(raw == 0, tie, raw < 0)
 
     def separate(
-        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Where the bundle differs from `known`, x does too; elsewhere x is taken to agree."""
         return bundled
 

@@ -38,13 +38,15 @@ class FHRR(VSA):
         """All ones: every angle 0."""
         return torch.ones(self.dim, dtype=self.dtype)
 
-    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """The element-wise complex product."""
         self.check(a, "a")
         self.check(b, "b")
         return a * b
 
-    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def unbind(
+        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """The product with the conjugate: exact for keys of length-1 elements."""
         self.check(bound, "bound")
         self.check(key, "key")
@@ -55,8 +57,8 @@ class FHRR(VSA):
         return divide(raw, raw.abs())
 
     def separate(
-        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """The angle of a sum of two lies midway, so x is `known` mirrored at the bundle."""
         return bundled**2 * known.conj()
 

@@ -38,13 +38,15 @@ class HRR(VSA):
         unit[0] = 1
         return unit
 
-    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """Circular convolution, by way of the Fourier transform."""
         self.check(a, "a")
         self.check(b, "b")
         return self._convolve(a, b, conjugate=False)
 
-    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def unbind(
+        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Circular correlation: convolution with the key's approximate inverse."""
         self.check(bound, "bound")
         self.check(key, "key")
@@ -62,7 +64,7 @@ class HRR(VSA):
         return divide(raw, norms(raw)[..., None].to(raw.dtype))
 
     def separate(
-        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate x from the bundle: two near-orthogonal vectors of length 1 have a sum of length √2."""
         return self.normalize(bundled * 2**0.5 - known)

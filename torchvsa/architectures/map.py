@@ -68,13 +68,15 @@ class MAP(VSA):
         """All ones."""
         return torch.ones(self.dim, dtype=self.dtype)
 
-    def bind(self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """The element-wise product; its own inverse on -1 / +1."""
         self.check(a, "a")
         self.check(b, "b")
         return a * b
 
-    def unbind(self, bound: Shaped[Tensor, "*batch d"], key: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+    def unbind(
+        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """The element-wise product again: exact for keys of -1 / +1."""
         self.check(bound, "bound")
         self.check(key, "key")
@@ -92,8 +94,8 @@ class MAP(VSA):
         return self._signs(raw, torch.roll(torch.where(raw >= 0, 1, -1), 1, -1))
 
     def bundle(
-        self, xs: Shaped[Tensor, "*batch k d"], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+    ) -> Shaped[Tensor, "..."]:
         """See `VSA.bundle`; the variants differ as the class says."""
         raw = self.superpose(xs, dim, weights)
         if self.variant == "B" and (voters := first_two(xs, dim, weights)) is not None:
@@ -104,8 +106,8 @@ class MAP(VSA):
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
 
     def separate(
-        self, bundled: Shaped[Tensor, "*batch d"], known: Shaped[Tensor, "*batch d"]
-    ) -> Shaped[Tensor, "*batch d"]:
+        self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate `x` from `bundle([x, known])`.
 
         C: exact for a bipolar x (where the sum is 0, x = -known). I: exact. B: where the bundle differs from

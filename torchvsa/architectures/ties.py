@@ -6,8 +6,8 @@ from torch import Tensor
 
 
 def first_two(
-    xs: Shaped[Tensor, "*batch k d"], dim: int, weights: Shaped[Tensor, "..."] | None
-) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch d"]] | None:
+    xs: Shaped[Tensor, "..."], dim: int, weights: Shaped[Tensor, "..."] | None
+) -> tuple[Shaped[Tensor, "..."], Shaped[Tensor, "..."]] | None:
     """The first two voters along `dim` that have a say (a weight other than 0), or None for fewer than two.
 
     They make the voter that breaks ties, so that it depends on the vectors themselves: with one fixed tie

@@ -1,7 +1,7 @@
 """Clean-up memory: the known item that a noisy hypervector resembles most."""
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import torch
 from jaxtyping import Float, Int, Shaped
@@ -53,7 +53,7 @@ class CleanUp(nn.Module):
         self.register_buffer("items", items)
         self.lengths = norms(items)
 
-    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> Self:
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "CleanUp":
         # The lengths follow the items wherever they go, but stay in float64 whatever type the items take.
         super()._apply(fn, recurse)
         self.lengths = norms(self.items)
