@@ -1,14 +1,20 @@
 """Behaviours as hypervectors: learned from demonstrations, asked with readings, combined by adding them."""
 
+from typing import TYPE_CHECKING, Any
+
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition import POLICIES, Bundle, Policy, Priority
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import RULES, ErrorDriven, OneShot, Rule
+from behaviours.learning import RULES, ErrorDriven, Gradient, LeastSquares, OneShot, Rule
 from behaviours.recall import Recall
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Encoder, Space
+
+if TYPE_CHECKING:
+    from behaviours.estimators import BehaviourClassifier as BehaviourClassifier
+    from behaviours.estimators import BehaviourRegressor as BehaviourRegressor
 
 __all__ = [
     "POLICIES",
@@ -20,7 +26,9 @@ __all__ = [
     "Demonstrations",
     "Encoder",
     "ErrorDriven",
+    "Gradient",
     "LearningReport",
+    "LeastSquares",
     "OneShot",
     "Policy",
     "Priority",
@@ -30,3 +38,16 @@ __all__ = [
     "Sensor",
     "Space",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """The estimators, which alone need scikit-learn, are loaded when they are first asked for."""
+    if name not in ("BehaviourClassifier", "BehaviourRegressor"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        from behaviours import estimators
+    except ModuleNotFoundError as error:
+        if (error.name or "").partition(".")[0] != "sklearn":
+            raise
+        raise ImportError(f"{name} needs scikit-learn: pip install 'torchvsa[corral]'", name="sklearn") from error
+    return getattr(estimators, name)

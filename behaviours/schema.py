@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
@@ -23,7 +24,9 @@ def _check_range(kind: str, name: str, low: float, high: float) -> None:
 class Sensor:
     """A real-valued sensor with readings in `[low, high]`; NaN means that it was not observed.
 
-    `beyond` says what becomes of a reading outside the range: an error, or the nearest bound.
+    `beyond` says what becomes of a reading outside the range: an error, or the nearest bound. `edges`, sorted values
+    within the range, part its bins where they shall not be of equal width: each edge belongs to the bin above
+    it, and the bins between equal edges stay empty. See `quantile_edges`.
     """
 
     name: str
@@ -31,9 +34,17 @@ class Sensor:
     high: float
     unit: str = ""
     beyond: Literal["error", "clip"] = "error"
+    edges: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         _check_range("sensor", self.name, self.low, self.high)
+        if self.edges is not None:
+            object.__setattr__(self, "edges", tuple(map(float, self.edges)))
+            marks = (self.low, *self.edges, self.high)
+            if not all(a <= b for a, b in pairwise(marks)):
+                raise ValueError(
+                    f"sensor {self.name!r}: edges must be sorted and lie within [{self.low:g}, {self.high:g}]"
+                )
         if self.beyond not in ("error", "clip"):
             raise ValueError(f"sensor {self.name!r}: beyond is 'error' or 'clip'; got {self.beyond!r}")
 
@@ -84,11 +95,21 @@ class Schema:
         """The bin of each reading: `bins` of equal width over each sensor's range, -1 for NaN (not observed).
 
         Bin `b` holds `low + width · b <= reading < low + width · (b + 1)`; `high` itself lies in the last.
+        Sensors with `edges` have their bins between them instead.
         Raises an error that names sensor, row and range for infinite readings and those out of range.
         """
         rows = self.check_readings(readings)
         low, high = self._bounds(self.sensors, rows.device)
         index = ((rows - low) * bins / (high - low)).floor().clamp(0, bins - 1)
+        for column, sensor in enumerate(self.sensors):
+            if sensor.edges is not None:
+                if len(sensor.edges) >= bins:
+                    raise ValueError(
+                        f"sensor {sensor.name!r} has {len(sensor.edges)} edges, which part one bin more than that; "
+                        f"the encoder has {bins}"
+                    )
+                edges = torch.tensor(sensor.edges, dtype=torch.float64, device=rows.device)
+                index[:, column] = torch.bucketize(rows[:, column].contiguous(), edges, right=True)
         return torch.where(rows.isnan(), -1, index.nan_to_num(0.0)).to(torch.int64)
 
     def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
@@ -135,6 +156,23 @@ class Schema:
         low = torch.tensor([part.low for part in parts], dtype=torch.float64, device=device)
         high = torch.tensor([part.high for part in parts], dtype=torch.float64, device=device)
         return low, high
+
+
+def quantile_edges(readings: Any, bins: int) -> Float64[Tensor, "edges"]:
+    """The edges `[bins - 1]` that part readings `[N]` into `bins` bins of nearly equal counts.
+
+    An edge lies midway between two neighbouring readings; where readings repeat, edges coincide. NaN is left
+    out; without any reading there are no edges. Sees no commands.
+    """
+    values = torch.as_tensor(readings, dtype=torch.float64).flatten()
+    values = values[~values.isnan()].sort().values
+    if len(values) < 2:
+        return values[:0]
+    above = (torch.arange(1, bins) * len(values)).div(bins, rounding_mode="floor").clamp(min=1)
+    low, high = values[above - 1], values[above]
+    middle = low + (high - low) / 2
+    # The mean of two floats side by side may be the lower of them, and would not part them.
+    return torch.where(middle > low, middle, high)
 
 
 def _rows(values: Any, columns: int, what: str, names: list[str]) -> Float64[Tensor, "batch columns"]:

@@ -9,14 +9,16 @@ from torch import Tensor, nn
 
 import torchvsa
 from behaviours.schema import Schema
-from torchvsa import PROTECTIONS, VSA, Protection, Record
+from torchvsa import PROTECTIONS, VSA, Protection, Record, Thresholds
 
 
 @dataclass(frozen=True)
 class Encoder:
     """How readings become conditions: bins, the codes of their values, and how a record joins them.
 
-    `values`, `combine`, `span` and `subset` are those of `torchvsa.Record`.
+    `values`, `combine`, `span` and `subset` are those of `torchvsa.Record`, except that `combine="thresholds"` means
+    `torchvsa.Thresholds`, which has no codes of values: bins and `subset` alone. `results` names the codes of the
+    actuators' levels, in `torchvsa.encoding.VALUES`.
     """
 
     bins: int = 32
@@ -24,6 +26,7 @@ class Encoder:
     combine: str = "bundle"
     span: int | None = None
     subset: int | None = None
+    results: str = "lookup"
 
 
 class Space(nn.Module):
@@ -32,6 +35,9 @@ class Space(nn.Module):
     `protection` is a name in `torchvsa.PROTECTIONS`, with options if need be
     (`{"name": "self_shift", "width": "sum"}`), or a `Protection`. The same seed draws the same codebooks.
     """
+
+    # A `Record`, or the like of it that `combine` names: indices `[B, n]` in, hypervectors `[B, d]` out.
+    conditions: Any
 
     def __init__(
         self,
@@ -46,10 +52,13 @@ class Space(nn.Module):
         self.encoder = encoder or Encoder()
         generator = torch.Generator().manual_seed(seed)
         options = asdict(self.encoder)
-        bins = options.pop("bins")
-        self.conditions = Record(vsa, len(schema.sensors), bins, generator=generator, **options)
+        bins, results = options.pop("bins"), options.pop("results")
+        if self.encoder.combine == "thresholds":
+            self.conditions = Thresholds(vsa, len(schema.sensors), bins, self.encoder.subset, generator)
+        else:
+            self.conditions = Record(vsa, len(schema.sensors), bins, generator=generator, **options)
         most = max(actuator.levels for actuator in schema.actuators)
-        self.results = Record(vsa, len(schema.actuators), most, generator=generator)
+        self.results = Record(vsa, len(schema.actuators), most, results, generator=generator)
         if not isinstance(protection, Protection):
             given: dict[str, Any] = {"name": protection} if isinstance(protection, str) else dict(protection)
             name = given.pop("name")
@@ -64,7 +73,7 @@ class Space(nn.Module):
 
     def bins(self, readings: Any) -> Int64[Tensor, "batch n"]:
         """The bin of each reading, -1 where it was not observed; raises for invalid readings."""
-        return self.schema.sensor_bins(readings, self.encoder.bins).to(self.conditions.table.device)
+        return self.schema.sensor_bins(readings, self.encoder.bins).to(self.results.table.device)
 
     def encode(self, bins: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """The protected condition of each row of bins (Algorithm 1, line 3, and the protection of line 6)."""

@@ -1,7 +1,7 @@
 """Vector Symbolic Architectures in PyTorch: batched, exact where integers allow, and plain tensors throughout."""
 
 from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
-from torchvsa.encoding import Record, level, lookup
+from torchvsa.encoding import Record, Thresholds, balanced, level, lookup
 from torchvsa.errors import ShapeError
 from torchvsa.memory import CleanUp, Match
 from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected
@@ -23,8 +23,10 @@ __all__ = [
     "Record",
     "SelfShift",
     "ShapeError",
+    "Thresholds",
     "Unprotected",
     "architecture",
+    "balanced",
     "level",
     "lookup",
 ]

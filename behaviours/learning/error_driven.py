@@ -54,10 +54,6 @@ class ErrorDriven(Rule):
         targets = self._targets(samples)
         items = space.results(samples.results)
         program, passes, updates, wrong = self._train(space, samples.conditions, targets, items)
-        known = sum(
-            (space.vsa.superpose(block) for block in samples.conditions.split(256)),
-            start=torch.zeros(space.vsa.dim, dtype=space.vsa.accumulator, device=items.device),
-        )
         report = LearningReport(
             self.name,
             samples=len(samples.condition),
@@ -68,7 +64,7 @@ class ErrorDriven(Rule):
             updates=updates,
             wrong=wrong,
         )
-        return Behaviour(space, program, known, samples.results, report)
+        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
 
     def _targets(self, samples: Samples) -> Tensor:
         """The result that each condition shall have."""

@@ -2,12 +2,14 @@
 
 from dataclasses import dataclass
 
+import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
 from behaviours.demonstrations import Demonstrations
 from behaviours.ordered import distinct_rows
 from behaviours.space import Space
+from torchvsa import VSA
 
 
 @dataclass(frozen=True)
@@ -39,3 +41,10 @@ class Samples:
         encoded, merged = distinct_rows(space.encode(distinct_bins))
         distinct_results, result = distinct_rows(levels)
         return cls(encoded, distinct_results, merged[condition], result)
+
+    def known(self, vsa: VSA) -> Shaped[Tensor, "d"]:
+        """The sum of the distinct conditions, as a raw accumulator."""
+        total = torch.zeros(vsa.dim, dtype=vsa.accumulator, device=self.conditions.device)
+        for block in self.conditions.split(256):
+            total = total + vsa.superpose(block)
+        return total

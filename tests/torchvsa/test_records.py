@@ -67,7 +67,9 @@ def test_swapped_values_give_another_record(vsa: VSA, values: str, combine: str,
     here, there = encode(torch.tensor([[0, 5], [5, 0]]))
     # Two voters split on half the elements; the product that decides them commutes, and is the same for both.
     tied = combine == "bundle" and vsa.name in ("MAP-B", "BSC")
-    assert abs(vsa.similarity(here, there) - (0.5 if tied else 0)) < chance
+    # Different balanced codes are less alike than by chance, each pair of 6 by 1/5.
+    spare = 0.2 if values == "balanced" else 0
+    assert abs(vsa.similarity(here, there) - (0.5 if tied else 0)) < chance + spare
 
 
 @values

@@ -2,6 +2,7 @@
 
 from torchvsa.encoding.combine import COMBINATIONS, Combination
 from torchvsa.encoding.record import Record
-from torchvsa.encoding.values import VALUES, level, lookup
+from torchvsa.encoding.thresholds import Thresholds
+from torchvsa.encoding.values import VALUES, balanced, level, lookup
 
-__all__ = ["COMBINATIONS", "VALUES", "Combination", "Record", "level", "lookup"]
+__all__ = ["COMBINATIONS", "VALUES", "Combination", "Record", "Thresholds", "balanced", "level", "lookup"]

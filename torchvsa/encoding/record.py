@@ -17,7 +17,7 @@ from torchvsa.errors import ShapeError
 class Record(nn.Module):
     """Encode rows of `n` values, each an index into `levels` codes, as hypervectors.
 
-    Every sensor has a random role; all sensors share the codes of `values` (`"lookup"`, `"level"`). The
+    Every sensor has a random role; all sensors share the codes of `values` (`"lookup"`, `"level"`, `"balanced"`). The
     role-bound values are bundled, bound, or bound over a random subset of the sensors per dimension
     (`combine="bundle" | "bind" | "subset"`). An index of -1 is *unobserved* and left out.
 

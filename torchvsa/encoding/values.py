@@ -47,4 +47,18 @@ def level(
     return torch.stack(codes)
 
 
-VALUES: dict[str, Callable[..., Tensor]] = {"lookup": lookup, "level": level}
+def balanced(vsa: VSA, levels: int, generator: torch.Generator | None = None) -> Shaped[Tensor, "levels d"]:
+    """Codes as far apart as they can be: in each dimension half of them, a random half, is negated.
+
+    An even number of codes has the cosine -1 / (levels - 1) between any two, an odd one -1 / levels. Two are each
+    other's negative; of two random codes half of the elements agree, and cannot tell them apart.
+
+    Source: a simplex of code words, as in error-correcting output codes (Dietterich and Bakiri 1995).
+    """
+    start = vsa.random(generator=generator)
+    ranks = torch.rand(levels, vsa.dim, generator=generator).argsort(0)
+    negated = (2 * ranks < levels).to(start.device)
+    return torch.where(negated, ~start if start.dtype == torch.bool else -start, start)
+
+
+VALUES: dict[str, Callable[..., Tensor]] = {"lookup": lookup, "level": level, "balanced": balanced}

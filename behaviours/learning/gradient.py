@@ -1,0 +1,218 @@
+"""Gradient descent on the mistakes of recall."""
+
+import math
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import torch
+from jaxtyping import Float, Int64, Shaped
+from torch import Tensor
+from torch.nn import functional
+
+from behaviours.behaviour import Behaviour
+from behaviours.demonstrations import Demonstrations
+from behaviours.learning.base import Rule
+from behaviours.learning.samples import Samples
+from behaviours.ordered import first_rows
+from behaviours.report import LearningReport
+from behaviours.space import Space
+from torchvsa import VSA
+from torchvsa.exact import dots, norms
+
+Loss = Literal["cross_entropy", "hinge", "squared"]
+Output = Literal["float", "bipolar", "int8"]
+
+
+@dataclass(frozen=True)
+class Gradient(Rule):
+    """Follow the gradient of a loss of the scores that recall compares, in small batches of samples.
+
+    The score of a result is `<unbind(program, condition), result> / |result|`, silence has the score 0.
+
+    | `loss` | of one sample |
+    |---|---|
+    | `cross_entropy` | -log of the softmax of the scores (silence among them) at the own result |
+    | `hinge` | the sum of the squares by which the own result leads any other, or silence, by less than 1 |
+    | `squared` | the squared distance of the scores from 1 for the own result and 0 for the others |
+
+    Adam with a cosine schedule goes `passes` times through the samples and, without `held_back`, answers with
+    the mean program of the last three tenths. With `held_back`, a share of the conditions is kept out of
+    training; the program that recalled most of them is the answer, and training stops after `patience` passes
+    without a better one.
+
+    `sparse` writes the program as the difference of two squares and descends on their roots: the same
+    programs, but few elements grow large, as under a penalty on absolute values. Use it where most dimensions have no
+    say, as with a threshold per dimension.
+
+    `output` trains a program of -1 / +1 (`"bipolar"`) or of integers from -127 to 127 (`"int8"`) with
+    straight-through gradients. All programs are floats in type; any architecture can be trained.
+
+    Source: Adam, Kingma and Ba 2015; straight-through, Bengio et al. 2013; difference of squares as
+    sparsity, Vaškevičius et al. 2019; trained class vectors, e.g. LeHDC, Duan et al. 2022.
+    """
+
+    name = "gradient"
+    counts = False
+
+    loss: Loss = "cross_entropy"
+    passes: int = 60
+    batch: int = 128
+    learning_rate: float = 0.05
+    sparse: bool = False
+    held_back: float = 0.0
+    patience: int = 10
+    output: Output = "float"
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        for field, options in (("loss", Loss), ("output", Output)):
+            if getattr(self, field) not in get_args(options):
+                raise ValueError(f"{field} is one of {', '.join(get_args(options))}; got {getattr(self, field)!r}")
+        if min(self.passes, self.batch, self.patience) < 1:
+            raise ValueError(
+                f"passes, batch and patience are at least 1; got {self.passes}, {self.batch}, {self.patience}"
+            )
+        if not (self.learning_rate > 0 and 0 <= self.held_back < 1):
+            raise ValueError(
+                f"learning_rate is above 0 and held_back a share in [0, 1); got {self.learning_rate}, {self.held_back}"
+            )
+
+    def fit(self, space: Space, demonstrations: Demonstrations) -> Behaviour:
+        """See `Rule.fit`. Raises `ValueError` if the share held back leaves no condition on one of both sides."""
+        samples = Samples.of(space, demonstrations)
+        items = space.results(samples.results)
+        generator = torch.Generator().manual_seed(self.seed)
+        train, held = self._split(samples, generator)
+        training = _Training(self, space.vsa, samples, items)
+        program, passes, updates = training.run(train, held, generator)
+        report = LearningReport(
+            self.name,
+            samples=len(samples.condition),
+            new=len(samples.conditions),
+            truly_known=len(samples.condition) - len(samples.conditions),
+            contradicting=int((_first(samples)[samples.condition] != samples.result).sum()),
+            passes=passes,
+            updates=updates,
+            wrong=training.wrong(program, torch.arange(len(samples.condition))),
+        )
+        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+
+    def _split(self, samples: Samples, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+        """The samples to train on and those held back: all of a condition on the same side."""
+        count = round(self.held_back * len(samples.conditions))
+        if self.held_back and not 0 < count < len(samples.conditions):
+            raise ValueError(
+                f"held_back={self.held_back} of {len(samples.conditions)} conditions leaves none to "
+                f"{'train on' if count else 'hold back'}; give more conditions or another share"
+            )
+        away = torch.zeros(len(samples.conditions), dtype=torch.bool)
+        away[torch.randperm(len(away), generator=generator)[:count]] = True
+        held = away[samples.condition.cpu()]
+        return (~held).nonzero()[:, 0], held.nonzero()[:, 0]
+
+
+class _Training:
+    """The parameters of one fit, and the program that they stand for."""
+
+    def __init__(self, rule: Gradient, vsa: VSA, samples: Samples, items: Shaped[Tensor, "r d"]) -> None:
+        self.rule, self.vsa, self.samples, self.items = rule, vsa, samples, items
+        self.lengths = norms(items)
+        wide = torch.float32 if vsa.integer else vsa.dtype
+        self.complex = wide.is_complex
+        zero = torch.zeros(vsa.dim, dtype=wide, device=items.device)
+        start = torch.view_as_real(zero) if self.complex else zero
+        # Two equal roots make a program of 0; at exactly 0 they would have no gradient.
+        start = torch.full((2, *start.shape), _ROOT, dtype=start.dtype, device=items.device) if rule.sparse else start
+        self.parameters = start.requires_grad_()
+
+    def floats(self) -> Float[Tensor, "..."]:
+        """The program before it is rounded; complex ones as pairs of real numbers."""
+        if not self.rule.sparse:
+            return self.parameters
+        # Roots are kept above 0 by their absolute value; x·|x| rather than x² keeps the gradient's sign right.
+        grow, shrink = self.parameters * self.parameters.abs()
+        return grow - shrink
+
+    def program(self, floats: Float[Tensor, "..."], *, scaled: bool = True) -> Shaped[Tensor, "d"]:
+        """The program as `output` rounds it, by default in the size at which it is trained."""
+        rounded = floats
+        if self.rule.output != "float":
+            size = floats.detach().abs()
+            if self.rule.output == "bipolar":
+                step, codes = size.mean(), torch.where(floats >= 0, 1.0, -1.0).to(floats)
+            else:
+                step = size.max() / 127
+                codes = (floats.detach() / step.clamp(min=torch.finfo(floats.dtype).tiny)).round()
+            # Rounded on the way there, the identity on the way back.
+            rounded = floats + (codes * step - floats).detach() if scaled else codes
+        return torch.view_as_complex(rounded) if self.complex else rounded
+
+    def scores(self, program: Shaped[Tensor, "d"], rows: Int64[Tensor, "batch"]) -> Float[Tensor, "batch r"]:
+        """What recall compares; `<c ⊗ p, r> = <c, p ⊗ r>`, so the program is folded into the results."""
+        # Whole rows are copied far faster by index_select than by an index.
+        conditions = self.samples.conditions.index_select(0, self.samples.condition[rows])
+        answers = dots(conditions, self.vsa.unbind(program, self.items))
+        return answers / self.lengths.to(answers.dtype)
+
+    def loss(self, rows: Int64[Tensor, "batch"]) -> Float[Tensor, ""]:
+        """The mean loss of some samples."""
+        answers = self.scores(self.program(self.floats()), rows)
+        aims = self.samples.result[rows]
+        if self.rule.loss == "squared":
+            return ((answers - functional.one_hot(aims, answers.shape[1])) ** 2).sum(1).mean()
+        answers = functional.pad(answers, (0, 1))
+        if self.rule.loss == "cross_entropy":
+            return functional.cross_entropy(answers, aims)
+        short = (1 - answers.gather(1, aims[:, None]) + answers).clamp(min=0)
+        return (short.scatter(1, aims[:, None], 0) ** 2).sum(1).mean()
+
+    @torch.no_grad()
+    def wrong(self, program: Shaped[Tensor, "d"], rows: Int64[Tensor, "N"]) -> int:
+        """How many samples recall another result than their own."""
+        parts = [self.scores(program, part).argmax(1) != self.samples.result[part] for part in rows.split(1024)]
+        return sum(int(part.sum()) for part in parts)
+
+    def run(self, train: Tensor, held: Tensor, generator: torch.Generator) -> tuple[Tensor, int, int]:
+        """Descend; the program, the passes and the number of steps."""
+        rule = self.rule
+        optimiser = torch.optim.Adam([self.parameters], lr=rule.learning_rate)
+        per_pass = math.ceil(len(train) / rule.batch)
+        best, best_wrong, best_pass = self.floats().detach().clone(), len(held) + 1, 0
+        total, averaged = torch.zeros_like(best, dtype=torch.float64), 0
+        step = sweep = 0
+        for sweep in range(1, rule.passes + 1):
+            order = train[torch.randperm(len(train), generator=generator)]
+            for rows in order.tensor_split(per_pass):
+                for group in optimiser.param_groups:
+                    group["lr"] = rule.learning_rate * (1 + math.cos(math.pi * step / (per_pass * rule.passes))) / 2
+                optimiser.zero_grad()
+                self.loss(rows).backward()
+                optimiser.step()
+                if rule.sparse:
+                    with torch.no_grad():
+                        self.parameters.clamp_(min=_FLOOR)
+                step += 1
+            now = self.floats().detach()
+            if not len(held):
+                if sweep > rule.passes - max(round(0.3 * rule.passes), 1):
+                    total, averaged = total + now, averaged + 1
+                continue
+            wrong = self.wrong(self.program(now), held)
+            if wrong < best_wrong:
+                best, best_wrong, best_pass = now.clone(), wrong, sweep
+            elif sweep - best_pass >= rule.patience:
+                break
+        answer = best if len(held) else (total / averaged).to(best.dtype)
+        return self.program(answer, scaled=False), sweep, step
+
+
+def _first(samples: Samples) -> Int64[Tensor, "k"]:
+    """The result with which each condition was shown first."""
+    return samples.result[first_rows(samples.condition)]
+
+
+_ROOT = 0.1
+"""Where the roots of a sparse program start: programs of 0.01, small beside those learned."""
+
+_FLOOR = 1e-4
+"""Roots stay above it, so that an element can come back."""

@@ -1,0 +1,106 @@
+"""The program whose answers come closest to what they shall be."""
+
+from dataclasses import dataclass
+
+import torch
+from jaxtyping import Float, Float64, Shaped
+from torch import Tensor
+
+from behaviours.behaviour import Behaviour
+from behaviours.demonstrations import Demonstrations
+from behaviours.learning.base import Rule
+from behaviours.learning.samples import Samples
+from behaviours.recall import scores
+from behaviours.report import LearningReport
+from behaviours.space import Space
+from torchvsa import VSA
+from torchvsa.exact import is_integer, norms, signed
+
+
+@dataclass(frozen=True)
+class LeastSquares(Rule):
+    """Answer each condition with 1 for its own result and 0 for every other one, as nearly as possible.
+
+    A condition shown with several results shall answer with the share of each. `ridge` keeps the program
+    short: it is the weight of its squared length, in units of the squared length of one stored pair.
+
+    The closed form needs a bind that acts on every dimension by itself, and real numbers; `fit` raises
+    `ValueError` for other architectures. The program is a float vector.
+
+    Source: ridge regression, Hoerl and Kennard 1970.
+    """
+
+    name = "least_squares"
+    counts = False
+
+    ridge: float = 1e-3
+
+    def __post_init__(self) -> None:
+        if not self.ridge > 0:
+            raise ValueError(f"ridge must be above 0; got {self.ridge}")
+
+    @classmethod
+    def supports(cls, vsa: VSA) -> bool:
+        """See `Rule.supports`: element-wise binding of real numbers."""
+        return vsa.elementwise and not vsa.dtype.is_complex
+
+    def fit(self, space: Space, demonstrations: Demonstrations) -> Behaviour:
+        """See `Rule.fit`."""
+        samples = Samples.of(space, demonstrations)
+        shape = len(samples.conditions), len(samples.results)
+        cells = samples.condition * shape[1] + samples.result
+        counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
+        items = space.results(samples.results)
+        targets = counts / counts.sum(1, keepdim=True)
+        program = solve(space.vsa, samples.conditions, items, targets, self.ridge)
+        said = scores(space.vsa, program, samples.conditions, items, norms(items)).argmax(1)
+        report = LearningReport(
+            self.name,
+            samples=len(samples.condition),
+            new=len(samples.conditions),
+            truly_known=len(samples.condition) - len(samples.conditions),
+            contradicting=int((counts.argmax(1)[samples.condition] != samples.result).sum()),
+            wrong=int((said != counts.argmax(1)).sum()),
+        )
+        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+
+
+def solve(
+    vsa: VSA,
+    conditions: Shaped[Tensor, "k d"],
+    items: Shaped[Tensor, "r d"],
+    targets: Float64[Tensor, "k r"],
+    ridge: float,
+) -> Float[Tensor, "d"]:
+    """The program p that minimises the sum over k and r of (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
+
+    `s` is the mean squared length of a pair c ⊗ r. With k·r pairs the system has k·r unknowns in the dual and d in the
+    primal form, and the smaller one is solved, in float64. Raises `ValueError` for architectures without
+    element-wise binding of real numbers.
+    """
+    if not LeastSquares.supports(vsa):
+        raise ValueError(
+            f"least squares needs a bind of real numbers, element by element, which {vsa.name} lacks; "
+            "train it with ErrorDriven or Gradient"
+        )
+    # Sums of fewer than 2^24 products of -1 and +1 are exact in float32, and twice as fast.
+    exact = is_integer(conditions) and is_integer(items)
+    c, r = (signed(x).to(torch.float32 if exact else torch.float64) for x in (conditions, items))
+    pairs = len(c) * len(r)
+    weight = ridge * float((c.double() ** 2).sum(0) @ (r.double() ** 2).sum(0)) / pairs
+    if pairs <= vsa.dim:
+        rows = (c[:, None] * r).flatten(0, 1)
+        system = (rows @ rows.T).double()
+        system.diagonal().add_(weight)
+        program = rows.double().T @ _positive(system, targets.reshape(-1))
+    else:
+        # Element-wise binding makes the d × d matrix of all pairs a product of two small ones.
+        system = ((c.T @ c) * (r.T @ r)).double()
+        system.diagonal().add_(weight)
+        program = _positive(system, (c.double() * (targets @ r.double())).sum(0))
+    return program.to(torch.float64 if vsa.dtype == torch.float64 else torch.float32)
+
+
+def _positive(system: Float64[Tensor, "n n"], target: Float64[Tensor, "n"]) -> Float64[Tensor, "n"]:
+    """Solve a positive definite system."""
+    return torch.cholesky_solve(target[:, None], torch.linalg.cholesky(system))[:, 0]

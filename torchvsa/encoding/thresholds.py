@@ -1,0 +1,98 @@
+"""A threshold per dimension: records whose elements each ask about a few sensors."""
+
+import torch
+from jaxtyping import Int, Shaped
+from torch import Tensor, nn
+
+from torchvsa.architectures import VSA
+from torchvsa.errors import ShapeError
+
+_CONSTANT = 1 / 16
+"""The share of dimensions that ask nothing: few, and enough to carry a constant answer."""
+
+
+class Thresholds(nn.Module):
+    """Encode rows of `n` values, each an index into `levels`, by a few comparisons per dimension.
+
+    Each dimension draws 1 to `subset` sensors, and for each of them a threshold and a side of it. It holds a
+    random element, negated where all of its sensors lie on their sides: an axis-aligned box, as the leaf of
+    a tree is, but drawn blindly. With one sensor the kernel is that of thermometer codes, which falls linearly from 1
+    to almost -1: one dimension in 16 asks nothing, or a program would have to answer one end of the range with
+    the opposite of the other.
+
+    An index of -1 is *unobserved*, and not asked: the sensors that are left decide, and a dimension without any is not
+    negated.
+
+    Unlike `Record` it keeps no table of values, so `levels` may be as many as there are readings: it holds 3 · subset
+    · d numbers. The thresholds of a sensor are spread evenly, so that few dimensions serve it well.
+
+    Source: thermometer codes, Kleyko et al. 2018; random features of boxes, as in random forests (Breiman 2001),
+    without their labels.
+    """
+
+    start: Tensor
+    sensor: Tensor
+    threshold: Tensor
+    above: Tensor
+
+    def __init__(
+        self,
+        vsa: VSA,
+        sensors: int,
+        levels: int,
+        subset: int | None = None,
+        generator: torch.Generator | None = None,
+    ) -> None:
+        super().__init__()
+        if sensors < 1 or levels < 1:
+            raise ValueError(f"a record needs at least one sensor and one level; got {sensors} and {levels}")
+        if subset is not None and subset < 1:
+            raise ValueError(
+                f"subset is the largest number of sensors bound in one dimension, at least 1; got {subset}"
+            )
+        self.vsa, self.sensors, self.levels = vsa, sensors, levels
+        most = min(subset or sensors, sensors)
+        self.register_buffer("start", vsa.random(generator=generator))
+        sizes = torch.randint(1, most + 1, (vsa.dim,), generator=generator)
+        constant = torch.rand(vsa.dim, generator=generator) < _CONSTANT
+        chosen = torch.rand(vsa.dim, sensors, generator=generator).argsort(-1)[:, :most].T.contiguous()
+        # Where a dimension has fewer sensors, its first one stands in their places too.
+        spare = torch.arange(most)[:, None] >= sizes
+        threshold = torch.zeros(most, vsa.dim, dtype=torch.int64)
+        for place in range(most):
+            for sensor in range(sensors):
+                held = ((chosen[place] == sensor) & ~spare[place] & ~constant).nonzero()[:, 0]
+                held = held[torch.randperm(len(held), generator=generator)]
+                # The i-th of k dimensions passes somewhere in the i-th of k equal stretches of the range.
+                spread = (torch.arange(len(held)) + torch.rand(len(held), generator=generator)) / max(len(held), 1)
+                threshold[place, held] = (spread * (levels - 1)).long().clamp(max=max(levels - 2, 0))
+        above = torch.rand(most, vsa.dim, generator=generator) < 0.5
+        # Nothing lies above the highest level.
+        threshold[0, constant], above[0, constant] = levels - 1, True
+        self.register_buffer("sensor", torch.where(spare, chosen[0], chosen))
+        self.register_buffer("threshold", torch.where(spare, threshold[0], threshold))
+        self.register_buffer("above", torch.where(spare, above[0], above))
+
+    def forward(self, indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
+        """Encode each row of indices in `[-1, levels)`.
+
+        Raises `ShapeError` unless the rows have one index per sensor.
+        """
+        if indices.dim() != 2 or indices.shape[1] != self.sensors:
+            raise ShapeError(
+                f"indices must be [batch, {self.sensors}], one column per sensor; got {tuple(indices.shape)}"
+            )
+        # Dimension by dimension: whole columns are copied and compared far faster than rows are gathered.
+        columns = indices.T.contiguous()
+        missing = columns < 0
+        against = torch.zeros(self.vsa.dim, len(indices), dtype=torch.bool, device=indices.device)
+        blind = ~against
+        for sensor, threshold, above in zip(self.sensor, self.threshold, self.above, strict=True):
+            unseen = missing.index_select(0, sensor)
+            side = columns.index_select(0, sensor) > threshold[:, None]
+            against |= (side ^ above[:, None]) & ~unseen
+            blind &= unseen
+        negated = ~(against | blind).T.contiguous()
+        if self.start.dtype == torch.bool:
+            return self.start ^ negated
+        return torch.where(negated, -self.start, self.start)
