@@ -12,16 +12,13 @@ of the teacher (agreement), and then drives by itself from held-out starts (succ
 import statistics
 import time
 from collections.abc import Mapping
-from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import hydra
 import numpy as np
-from hydra.core.hydra_config import HydraConfig
-from hydra.types import RunMode
-from omegaconf import DictConfig, OmegaConf
+from omegaconf import DictConfig
 from rich.console import Console
 from rich.table import Table
 
@@ -29,15 +26,11 @@ import sim
 from behaviours import Behaviour, BehaviourBank, Policy, Space
 from experiments import presets
 from experiments.agreement import Agreement, measure
-from experiments.command_line import errors_in_one_line
+from experiments.command_line import errors_in_one_line, job
 from experiments.controllers import CONTROLLERS, Controller, Study, check_names
 from experiments.driving import Driver, progress_bars, workers
-from experiments.lessons import from_file, shown_in
-from experiments.results import Results, Row, finished
-
-FIRST_DEMONSTRATION = 1_000_000
-FIRST_VALIDATION = 2_000_000
-"""Held-out starts are the episodes 0, 1, ...; those to learn from and to choose settings with lie far away."""
+from experiments.lessons import FIRST_DEMONSTRATION, FIRST_VALIDATION, from_file, shown_in
+from experiments.results import Results, Row
 
 COLUMNS = (
     "controller",
@@ -225,19 +218,7 @@ def _cell(value: object) -> str:
 @hydra.main(version_base="1.3", config_path="pkg://experiments.conf", config_name="corral")
 def run(cfg: DictConfig) -> None:
     """One job."""
-    console = Console()
-    if not console.is_terminal:
-        console.width = 150  # a file has no width of its own; the table needs this much
-    config = cast(dict[str, Any], OmegaConf.to_container(cfg, resolve=True))
-    folder = Path(HydraConfig.get().runtime.output_dir)
-    if finished(folder, config):
-        console.print(f"{folder} holds the results of these settings already; nothing to do")
-        return
-    # A sweep goes on after a job that failed, and Hydra then says which one it was.
-    with errors_in_one_line("torchvsa-corral") if HydraConfig.get().mode == RunMode.RUN else nullcontext():
-        results = study(config, folder, console)
-    print_table(results, console)
-    console.print(f"{folder / 'report.html'} shows it; results.json and records.parquet lie beside it", soft_wrap=True)
+    job(cfg, "torchvsa-corral", study, print_table)
 
 
 def main() -> None:

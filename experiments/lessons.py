@@ -9,6 +9,10 @@ import sim
 from behaviours import Demonstrations
 from experiments import presets
 
+FIRST_DEMONSTRATION = 1_000_000
+FIRST_VALIDATION = 2_000_000
+"""Held-out starts are the episodes 0, 1, ...; those to learn from and to choose settings with lie far away."""
+
 
 def shown_in(rollout: sim.Rollout) -> tuple[Demonstrations, NDArray[np.bool_]]:
     """The control steps of a recorded rollout as a demonstration, and which of them came before the lamp."""
