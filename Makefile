@@ -1,16 +1,21 @@
-# `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs.
+# `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs;
+# `make bench` measures speed beside peers.
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: run test lint
+.PHONY: run test lint bench
 
 run: $(INSTALLED)
 	$(BIN)/python -m experiments.corral
 
 test: $(INSTALLED) lint
 	$(BIN)/python -m pytest -n 2 --dist worksteal
+
+bench: $(INSTALLED)
+	$(BIN)/python -m benchmarks
+	$(BIN)/python -m benchmarks.memory
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -8,6 +8,7 @@ from torch import nn
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import OneShot, Rule
+from behaviours.progress import Progress, silent
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from behaviours.storage import load_tensors, save_tensors
@@ -24,12 +25,26 @@ class BehaviourBank(nn.Module):
         self.space = space
         self.behaviours = nn.ModuleDict()
 
-    def learn(self, name: str, demonstrations: Demonstrations, rule: Rule | None = None) -> LearningReport:
+    def learn(
+        self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = silent
+    ) -> LearningReport:
         """Learn a behaviour (with `OneShot()`, if no rule is given) and keep it under `name`.
 
-        An existing behaviour of that name is replaced. Says what the rule did with the samples.
+        An existing behaviour of that name is replaced. Says what the rule did with the samples; `progress` is called
+        with the share of the work that is done.
         """
-        behaviour = (rule or OneShot()).fit(self.space, demonstrations)
+        behaviour = (rule or OneShot()).fit(self.space, demonstrations, progress)
+        self.add(name, behaviour)
+        return behaviour.report
+
+    def partial_fit(self, name: str, demonstrations: Demonstrations, rule: Rule) -> LearningReport:
+        """Go on learning the behaviour `name` from a further piece of demonstration, or begin it with its first.
+
+        Says what became of all pieces so far. Raises `ValueError` for rules that cannot, see `Rule.partial_fit`.
+        """
+        if name not in self:
+            return self.learn(name, demonstrations, rule)
+        behaviour = rule.partial_fit(self[name], demonstrations)
         self.add(name, behaviour)
         return behaviour.report
 

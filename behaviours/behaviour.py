@@ -3,15 +3,17 @@
 from typing import Any
 
 import torch
-from jaxtyping import Int64, Shaped
+from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
+from behaviours.folding import Folded
 from behaviours.memory import ResultMemory
 from behaviours.recall import Recall, scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import ShapeError
-from torchvsa.exact import divide, dots, norms
+from torchvsa.blocks import by_blocks
+from torchvsa.exact import is_integer, norms, signed
 from torchvsa.memory import best
 
 
@@ -41,9 +43,13 @@ class Behaviour(nn.Module):
                 raise ShapeError(f"{name} must be one hypervector [{space.vsa.dim}]; got shape {tuple(vector.shape)}")
         self.space = space
         self.report = report
-        self.register_buffer("program", program)
+        if isinstance(program, nn.Parameter):
+            self.register_parameter("program", program)
+        else:
+            self.register_buffer("program", program)
         self.register_buffer("known", known)
         self.memory = ResultMemory(space, results)
+        self._folding: tuple[tuple[int, ...], tuple[Tensor, ...], Folded] | None = None
 
     @property
     def results(self) -> Int64[Tensor, "k m"]:
@@ -53,21 +59,75 @@ class Behaviour(nn.Module):
     def forward(self, readings: Any) -> Recall:
         """Commands `[B, m]` for readings `[B, n]`, with similarity, margin and familiarity (see `Recall`).
 
-        Raises an error that names sensor, row and range for readings that are not valid.
+        Raises an error that names sensor, row and range for readings that are not valid. A graph (`torch.compile`,
+        `torch.export`) takes readings as a tensor and cannot raise: there, those out of range are clipped.
         """
         bins = self.space.bins(readings)
-        recall = self.ask(self.space.encode(bins))
+        # Some rows at a time go all the way, so that their conditions never leave the cache.
+        recall = by_blocks(lambda rows: self.ask(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes * 2)
         return recall.blank((bins < 0).all(-1))
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """Answer conditions that are encoded and protected already (Algorithm 2, lines 2 to 8)."""
-        vsa, items = self.space.vsa, self.memory.items
-        match = best(
-            scores(vsa, self.program, conditions, items, norms(items)), vsa.unbound_norm(self.program, conditions)
-        )
-        resemblance = dots(conditions, self.known[None])[..., 0]
-        familiarity = divide(resemblance, norms(conditions) * norms(self.known)).to(torch.float32)
-        return Recall(self.memory.commands[match.index], match.similarity, match.margin, familiarity)
+        answers = self._folded()(conditions)
+        match = best(answers.scores, answers.lengths)
+        commands = self.memory.commands[match.index]
+        return Recall(commands, match.similarity, match.margin, answers.familiarity.to(torch.float32))
+
+    def _folded(self) -> Folded:
+        """The folded program: as long as no tensor that it is made of changes, the same one."""
+        parts = (self.program, self.known, self.memory.items)
+        if torch.compiler.is_compiling() or any(part.requires_grad or part.is_inference() for part in parts):
+            return Folded(self.space.vsa, *parts)
+        versions = tuple(part._version for part in parts)
+        if (
+            self._folding is None
+            or self._folding[0] != versions
+            or any(mine is not part for mine, part in zip(self._folding[1], parts, strict=True))
+        ):
+            self._folding = versions, parts, Folded(self.space.vsa, *parts)
+        return self._folding[2]
+
+    def scores(self, readings: Any) -> Float[Tensor, "batch k"]:
+        """What recall compares: how strongly each of `results` is answered, `<unbind(program, c), item> / |item|`.
+
+        In float64, and differentiable by the program, see `trainable`.
+        """
+        items = self.memory.items
+        return scores(self.space.vsa, self.program, self.space.encode(self.space.bins(readings)), items, norms(items))
+
+    def labels(self, commands: Any) -> Int64[Tensor, "batch"]:
+        """Where each row of commands `[B, m]` stands in `results`; raises `ValueError` if it is not stored."""
+        levels = self.space.schema.command_levels(commands).to(self.results.device)
+        same = (levels[:, None] == self.results).all(-1)
+        if not same.any(-1).all():
+            row = int((~same.any(-1)).nonzero()[0])
+            raise ValueError(
+                f"row {row} asks for levels {levels[row].tolist()}, which are none of the {len(self.results)} stored "
+                "results; learn a demonstration that holds them first"
+            )
+        return same.to(torch.int8).argmax(-1)
+
+    def trainable(self) -> "Behaviour":
+        """A copy over the same space whose program is a float `nn.Parameter`, for an ordinary training loop.
+
+            behaviour = bank["seek_light"].trainable()
+            labels = behaviour.labels(shown.commands)
+            optimiser = torch.optim.Adam(behaviour.parameters(), lr=0.1)
+            for _ in range(100):
+                optimiser.zero_grad()
+                loss = torch.nn.functional.cross_entropy(behaviour.scores(shown.sensors), labels)
+                loss.backward()
+                optimiser.step()
+            bank.add("seek_light", behaviour)
+
+        It is a behaviour like any other: asked, copied, saved in a bank, exported. (A bank file holds its program as a
+        tensor; what is loaded from one can be made trainable again.)
+        """
+        program = signed(self.program).detach()
+        wide = torch.float32 if is_integer(program) else program.dtype
+        parameter = nn.Parameter(program.to(wide, copy=True))
+        return Behaviour(self.space, parameter, self.known.clone(), self.results.clone(), self.report)
 
     def clipped(self) -> "Behaviour":
         """A copy whose program and known conditions are hypervectors of the architecture, not raw sums.
@@ -75,4 +135,5 @@ class Behaviour(nn.Module):
         Clipping loses the counts: a program of many pairs recalls far fewer of them afterwards.
         """
         vsa = self.space.vsa
-        return Behaviour(self.space, vsa.normalize(self.program), vsa.normalize(self.known), self.results, self.report)
+        program = vsa.normalize(self.program.detach())
+        return Behaviour(self.space, program, vsa.normalize(self.known), self.results, self.report)

@@ -14,10 +14,12 @@ from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted, validate_data
 from torch import Tensor
 
+from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import Gradient
 from behaviours.learning.least_squares import solve
 from behaviours.recall import scores
+from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Schema, Sensor, quantile_edges
 from behaviours.space import Encoder, Space
 from torchvsa import MAP
@@ -119,11 +121,54 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
         self.classes_, labels = np.unique(y, return_inverse=True)
         if len(self.classes_) < 2:
             raise ValueError(f"a classifier needs at least 2 classes; the data hold one class, {self.classes_[0]!r}")
-        count, seed = len(self.classes_), self._seed()
-        space = self._space(readings, [Actuator("class", 0, count - 1, levels=count)], seed)
-        rule = Gradient(passes=self.passes, batch=self.batch, learning_rate=self.learning_rate, sparse=True, seed=seed)
-        self.behaviour_ = rule.fit(space, Demonstrations(torch.tensor(readings), torch.tensor(labels[:, None])))
+        space = self._class_space(readings)
+        shown = Demonstrations(torch.tensor(readings), torch.tensor(labels[:, None]))
+        self.behaviour_ = self._rule(space.seed).fit(space, shown)
         return self
+
+    def partial_fit(self, X: Any, y: Any, classes: Any = None) -> Self:  # noqa: N803
+        """Go on training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
+
+        The edges of the bins come from the first batch: it should span the readings to come, since
+        values beyond it count as the nearest of them. Each call goes `passes` times through its own rows, and nothing
+        else reminds the program of earlier ones: with batches of one class each, take few passes.
+
+        Raises `ValueError` for labels that are none of `classes`, and as `fit` does.
+        """
+        first = not hasattr(self, "behaviour_")
+        readings, y = self._checked(X, y, reset=first)
+        check_classification_targets(y)
+        given = None if classes is None else np.unique(classes)
+        if first:
+            if given is None or len(given) < 2:
+                raise ValueError(f"the first call of partial_fit needs all classes, at least 2; got classes={classes}")
+            self.classes_ = given
+        elif given is not None and not np.array_equal(given, self.classes_):
+            raise ValueError(f"classes are {self.classes_} since the first call; got {given}")
+        if len(unknown := np.setdiff1d(y, self.classes_)):
+            raise ValueError(f"y holds {unknown[0]!r}, which is none of the classes {self.classes_}")
+        if first:
+            self.behaviour_ = self._blank(self._class_space(readings))
+        labels = torch.from_numpy(np.searchsorted(self.classes_, y)[:, None])
+        before = self.behaviour_
+        # Another seed for each call, or all would visit their rows in the same order.
+        rule = self._rule(before.space.seed + before.report.updates)
+        self.behaviour_ = rule.partial_fit(before, Demonstrations(torch.tensor(readings), labels))
+        return self
+
+    def _class_space(self, readings: Float64[np.ndarray, "N n"]) -> Space:
+        count = len(self.classes_)
+        return self._space(readings, [Actuator("class", 0, count - 1, levels=count)], self._seed())
+
+    def _rule(self, seed: int) -> Gradient:
+        return Gradient(passes=self.passes, batch=self.batch, learning_rate=self.learning_rate, sparse=True, seed=seed)
+
+    def _blank(self, space: Space) -> Behaviour:
+        """The behaviour that knows all classes and no condition."""
+        zeros = torch.zeros(space.vsa.dim)
+        known = zeros.to(space.vsa.accumulator)
+        levels = torch.arange(len(self.classes_))[:, None]
+        return Behaviour(space, zeros, known, levels, LearningReport(Gradient.name, samples=0, new=0, passes=0))
 
     def _scores(self, X: Any) -> Float64[np.ndarray, "N K"]:  # noqa: N803
         check_is_fitted(self)

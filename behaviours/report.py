@@ -25,11 +25,18 @@ class LearningReport:
     """How often a trained program was corrected."""
     wrong: int = 0
     """Pairs that a trained program still recalls wrongly, or below the margin asked for."""
+    presumed_known: int = 0
+    """Samples taken as known for their likeness to earlier pieces: truly or falsely, nobody remembers."""
 
     @property
     def pairs(self) -> int:
         """Pairs of condition and result added to the program, repetitions included."""
         return self.new + self.re_added
+
+    def then(self, later: "LearningReport") -> "LearningReport":
+        """The report of two pieces of demonstration: counts add up; `wrong` is known of the later one only."""
+        counts = {key: value + getattr(later, key) for key, value in asdict(self).items() if key != "rule"}
+        return LearningReport(later.rule, **counts | {"wrong": later.wrong})
 
     def to_dict(self) -> dict[str, str | int]:
         """Plain values, for a file."""

@@ -100,22 +100,39 @@ class Schema:
         """
         rows = self.check_readings(readings)
         low, high = self._bounds(self.sensors, rows.device)
+        unseen = rows.isnan()
         index = ((rows - low) * bins / (high - low)).floor().clamp(0, bins - 1)
-        for column, sensor in enumerate(self.sensors):
-            if sensor.edges is not None:
-                if len(sensor.edges) >= bins:
-                    raise ValueError(
-                        f"sensor {sensor.name!r} has {len(sensor.edges)} edges, which part one bin more than that; "
-                        f"the encoder has {bins}"
-                    )
-                edges = torch.tensor(sensor.edges, dtype=torch.float64, device=rows.device)
-                index[:, column] = torch.bucketize(rows[:, column].contiguous(), edges, right=True)
-        return torch.where(rows.isnan(), -1, index.nan_to_num(0.0)).to(torch.int64)
+        index = torch.where(unseen, 0.0, index).to(torch.int64)
+        if any(sensor.edges is not None for sensor in self.sensors):
+            columns = zip(self.sensors, rows.unbind(1), index.unbind(1), strict=True)
+            index = torch.stack([self._between_edges(s, bins, row, even) for s, row, even in columns], 1)
+        return torch.where(unseen, -1, index)
+
+    @staticmethod
+    def _between_edges(sensor: Sensor, bins: int, readings: Tensor, even: Tensor) -> Int64[Tensor, "batch"]:
+        """The bins of one sensor's readings between its edges, or those of `even` width where it has none."""
+        if sensor.edges is None:
+            return even
+        if len(sensor.edges) >= bins:
+            raise ValueError(
+                f"sensor {sensor.name!r} has {len(sensor.edges)} edges, which part one bin more than that; "
+                f"the encoder has {bins}"
+            )
+        edges = torch.tensor(sensor.edges, dtype=torch.float64, device=readings.device)
+        if torch.compiler.is_exporting():
+            # The same by comparisons: interchange formats have no bucket search.
+            return (readings[:, None] >= edges).sum(1)
+        return torch.bucketize(readings.contiguous(), edges, right=True)
 
     def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
-        """Readings as float64 rows, clipped where a sensor says so; raises if any is not valid."""
+        """Readings as float64 rows, clipped where a sensor says so; raises if any is not valid.
+
+        In a compiled or exported graph no value can raise: there all readings, infinite ones too, are clipped.
+        """
         rows = _rows(readings, len(self.sensors), "sensor readings", [s.name for s in self.sensors])
         low, high = self._bounds(self.sensors, rows.device)
+        if torch.compiler.is_compiling():
+            return torch.minimum(torch.maximum(rows, low), high)
         outside = (rows < low) | (rows > high)  # False for NaN
         strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
         wrong = rows.isinf() | (outside & strict)

@@ -1,6 +1,7 @@
 """Vector Symbolic Architectures in PyTorch: batched, exact where integers allow, and plain tensors throughout."""
 
 from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
+from torchvsa.capacity import dim_needed, pairs_held, recall_probability
 from torchvsa.encoding import Record, Thresholds, balanced, level, lookup
 from torchvsa.errors import ShapeError
 from torchvsa.memory import CleanUp, Match
@@ -27,6 +28,9 @@ __all__ = [
     "Unprotected",
     "architecture",
     "balanced",
+    "dim_needed",
     "level",
     "lookup",
+    "pairs_held",
+    "recall_probability",
 ]

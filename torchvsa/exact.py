@@ -9,6 +9,8 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
+from torchvsa.blocks import by_blocks
+
 
 def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
     """Bits as votes (False: +1, True: -1, so that XOR is a product); any other tensor as it is."""
@@ -18,6 +20,10 @@ def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
 def is_integer(x: Tensor) -> bool:
     """Whether a tensor holds integers (bits included), whose sums and products are exact."""
     return not (x.is_floating_point() or x.is_complex())
+
+
+_FEW = 16
+"""Fewer items than these stand on the left of an int8 product of many rows, where it is faster."""
 
 
 def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
@@ -32,9 +38,13 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         wide = torch.promote_types(a.dtype, b.dtype)
         a, b = (torch.view_as_real(x.to(wide).resolve_conj()).flatten(-2) for x in (a, b))
         return a @ b.T
-    if a.dtype == torch.int8 and b.dtype == torch.int8 and a.device.type == "cpu" and a.shape[-1] > 1:
+    int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
+    if int8 and a.device.type == "cpu" and a.shape[-1] > 1:
         # The int8 units of the CPU, summing in int32 (they answer nonsense where d = 1).
-        return torch.ops.aten._int_mm(a.reshape(-1, a.shape[-1]), b.T).reshape(*a.shape[:-1], len(b))
+        rows = a.reshape(-1, a.shape[-1])
+        if len(b) < _FEW < len(rows):
+            return torch.ops.aten._int_mm(b, rows.T).T.reshape(*a.shape[:-1], len(b))
+        return torch.ops.aten._int_mm(rows, b.T).reshape(*a.shape[:-1], len(b))
     if is_integer(a) or is_integer(b):
         # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
         wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)
@@ -57,7 +67,14 @@ def paired_dots(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) 
 
 def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
     """Euclidean length in float64 (integers: the root of an exact sum), with a gradient of 0 at the zero vector."""
+    if x.dtype == torch.int8 and x.dim() == 2 and not torch.compiler.is_exporting() and len(x) > _FEW:
+        return root(by_blocks(_int8_squares, x, row_bytes=4 * x.shape[-1]))
     return root(paired_dots(x, x))
+
+
+def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
+    # Floats are summed fastest, and are exact below 2^24, which 1,023 squares of int8 cannot reach.
+    return torch.stack([part.to(torch.float32).square().sum(-1).to(torch.float64) for part in x.split(1023, -1)]).sum(0)
 
 
 def root(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
@@ -69,3 +86,8 @@ def root(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
 def divide(values: Shaped[Tensor, "*s"], lengths: Shaped[Tensor, "*t"]) -> Shaped[Tensor, "*s"]:
     """`values / lengths`, and 0 where the length is 0: a zero vector is similar to nothing."""
     return torch.where(lengths > 0, values / torch.where(lengths > 0, lengths, 1.0), 0.0)
+
+
+def scaled(products: Shaped[Tensor, "*batch"], lengths: Shaped[Tensor, "*#batch"]) -> Shaped[Tensor, "*batch"]:
+    """`divide` for products with vectors of these lengths: those with a zero vector are 0 already, so one pass does."""
+    return products / torch.where(lengths > 0, lengths, 1.0)

@@ -11,6 +11,7 @@ from jaxtyping import Int, Shaped
 from torch import Tensor, nn
 
 from torchvsa.architectures import VSA
+from torchvsa.blocks import by_blocks
 from torchvsa.exact import dots, is_integer, signed
 
 
@@ -120,7 +121,11 @@ class SelfShift(Protection):
 
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""
-        sums = dots(self.vsa.positive(x).to(torch.int8), self.columns).to(torch.int64)
+        if is_integer(x) and x.dtype != torch.bool:
+            marks = x.clamp(0, 1).to(torch.int8)  # several times faster than comparing, and the same for integers
+        else:
+            marks = self.vsa.positive(x).to(torch.int8)
+        sums = dots(marks, self.columns).to(torch.int64)
         count, total = sums[..., 0], (sums[..., 1:] * self.places).sum(-1)
         if self.width_rule == "sum":
             return total % self.vsa.dim
@@ -129,8 +134,13 @@ class SelfShift(Protection):
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Superpose `x` with `h`, then shift by the width of `x`."""
         self.vsa.check(x, "x")
-        named = self.vsa.bundle(torch.stack(torch.broadcast_tensors(x, self.h.to(x.dtype)), -2))
-        return self.vsa.permute(named, self.width(x))
+        rows = x.reshape(-1, self.vsa.dim)
+        # The longest step between holds each row written twice.
+        return by_blocks(self._protect, rows, row_bytes=2 * rows.element_size() * self.vsa.dim).reshape(x.shape)
+
+    def _protect(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch d"]:
+        named = self.vsa.bundle_two(rows, self.h.to(rows.dtype))
+        return self.vsa.permute(named, self.width(rows))
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""

@@ -36,7 +36,7 @@ class Priority(Policy):
         familiarity = torch.stack([recall.familiarity for recall in answers])
         knows = familiarity > torch.tensor(self.thresholds, device=familiarity.device)[:, None]
         speaker = torch.where(knows.any(0), knows.to(torch.int8).argmax(0), familiarity.argmax(0))
-        rows = torch.arange(len(conditions), device=speaker.device)
+        rows = torch.arange(conditions.shape[0], device=speaker.device)
 
         def spoken(field: str) -> Tensor:
             return torch.stack([getattr(recall, field) for recall in answers])[speaker, rows]

@@ -4,8 +4,10 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 from behaviours.demonstrations import Demonstrations
+from behaviours.progress import Progress, silent
 from behaviours.space import Space
 from torchvsa import VSA
+from torchvsa.exact import signed
 
 if TYPE_CHECKING:
     from behaviours.behaviour import Behaviour
@@ -18,11 +20,36 @@ class Rule(ABC):
     counts: ClassVar[bool] = True
     """Whether programs are sums of pairs, integers for integer codes; else they are always floats."""
 
+    incremental: ClassVar[bool] = False
+    """Whether it can go on from a behaviour with some of its options, see `partial_fit`."""
+
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
         """Whether the rule can train programs of this architecture."""
         return True
 
     @abstractmethod
-    def fit(self, space: Space, demonstrations: Demonstrations) -> "Behaviour":
-        """Learn one program from the demonstration. Raises for readings or commands that are not valid."""
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> "Behaviour":
+        """Learn one program from the demonstration. Raises for readings or commands that are not valid.
+
+        `progress` is called with the share of the work that is done, see `behaviours.progress`.
+        """
+
+    def partial_fit(self, behaviour: "Behaviour", demonstrations: Demonstrations) -> "Behaviour":
+        """Go on learning: what becomes of `behaviour`, whichever rule it is from, when this is shown as well.
+
+        Of earlier demonstrations only the behaviour is left: its program, known conditions and clean-up memory. New
+        results are appended to the memory in order of first insertion. Contradictions are settled within the piece,
+        and the report counts a condition as new in each piece that stores it. `behaviour` itself stays as it is.
+
+        Raises `ValueError` where a rule, or an option of it, needs more than that.
+        """
+        raise ValueError(f"{self.name!r} cannot go on from a behaviour; show all demonstrations at once, to fit")
+
+
+def grown(before: "Behaviour | None", piece: "Behaviour") -> "Behaviour":
+    """`piece`, whose known conditions and report take in those of the behaviour `before` it."""
+    if before is not None:
+        piece.known = piece.known + signed(before.known)
+        piece.report = before.report.then(piece.report)
+    return piece

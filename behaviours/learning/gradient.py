@@ -11,13 +11,13 @@ from torch.nn import functional
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning.base import Rule
-from behaviours.learning.samples import Samples
-from behaviours.ordered import first_rows
+from behaviours.learning.base import Rule, grown
+from behaviours.learning.samples import Contradictions, Samples, check_contradictions
+from behaviours.progress import Progress, silent
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import dots, norms
+from torchvsa.exact import dots, norms, signed
 
 Loss = Literal["cross_entropy", "hinge", "squared"]
 Output = Literal["float", "bipolar", "int8"]
@@ -44,6 +44,9 @@ class Gradient(Rule):
     programs, but few elements grow large, as under a penalty on absolute values. Use it where most dimensions have no
     say, as with a threshold per dimension.
 
+    Every sample has its say where contradictory ones share a condition (`contradictions="all"`); else all of them
+    show the `"first"`, the `"majority"` or the `"latest"` result.
+
     `output` trains a program of -1 / +1 (`"bipolar"`) or of integers from -127 to 127 (`"int8"`) with
     straight-through gradients. All programs are floats in type; any architecture can be trained.
 
@@ -53,6 +56,7 @@ class Gradient(Rule):
 
     name = "gradient"
     counts = False
+    incremental = True
 
     loss: Loss = "cross_entropy"
     passes: int = 60
@@ -63,8 +67,10 @@ class Gradient(Rule):
     patience: int = 10
     output: Output = "float"
     seed: int = 0
+    contradictions: Contradictions | Literal["all"] = "all"
 
     def __post_init__(self) -> None:
+        check_contradictions(self.contradictions, "all")
         for field, options in (("loss", Loss), ("output", Output)):
             if getattr(self, field) not in get_args(options):
                 raise ValueError(f"{field} is one of {', '.join(get_args(options))}; got {getattr(self, field)!r}")
@@ -77,25 +83,46 @@ class Gradient(Rule):
                 f"learning_rate is above 0 and held_back a share in [0, 1); got {self.learning_rate}, {self.held_back}"
             )
 
-    def fit(self, space: Space, demonstrations: Demonstrations) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
         """See `Rule.fit`. Raises `ValueError` if the share held back leaves no condition on one of both sides."""
-        samples = Samples.of(space, demonstrations)
+        return self._learn(space, Samples.of(space, demonstrations), progress=progress)
+
+    def partial_fit(self, behaviour: Behaviour, demonstrations: Demonstrations) -> Behaviour:
+        """See `Rule.partial_fit`: descend from the program at hand, with a new optimiser and a new schedule.
+
+        Nothing holds an earlier piece in place but the program's own inertia: take few passes or a low learning rate.
+        Raises `ValueError` unless `output` is `"float"`, since a rounded program cannot follow small steps.
+        """
+        if self.output != "float":
+            raise ValueError(
+                f"a program rounded to {self.output!r} no longer holds what small steps add up to; go on with "
+                "output='float'"
+            )
+        samples = Samples.of(behaviour.space, demonstrations).after(behaviour.results)
+        return self._learn(behaviour.space, samples, behaviour)
+
+    def _learn(
+        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = silent
+    ) -> Behaviour:
+        aims = shown.targets("first" if self.contradictions == "all" else self.contradictions)
+        samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
         items = space.results(samples.results)
         generator = torch.Generator().manual_seed(self.seed)
         train, held = self._split(samples, generator)
-        training = _Training(self, space.vsa, samples, items)
-        program, passes, updates = training.run(train, held, generator)
+        training = _Training(self, space.vsa, samples, items, before)
+        program, passes, updates = training.run(train, held, generator, progress)
+        progress(1.0)
         report = LearningReport(
             self.name,
             samples=len(samples.condition),
             new=len(samples.conditions),
             truly_known=len(samples.condition) - len(samples.conditions),
-            contradicting=int((_first(samples)[samples.condition] != samples.result).sum()),
+            contradicting=int((aims[shown.condition] != shown.result).sum()),
             passes=passes,
             updates=updates,
             wrong=training.wrong(program, torch.arange(len(samples.condition))),
         )
-        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+        return grown(before, Behaviour(space, program, samples.known(space.vsa), samples.results, report))
 
     def _split(self, samples: Samples, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """The samples to train on and those held back: all of a condition on the same side."""
@@ -114,15 +141,25 @@ class Gradient(Rule):
 class _Training:
     """The parameters of one fit, and the program that they stand for."""
 
-    def __init__(self, rule: Gradient, vsa: VSA, samples: Samples, items: Shaped[Tensor, "r d"]) -> None:
+    def __init__(
+        self,
+        rule: Gradient,
+        vsa: VSA,
+        samples: Samples,
+        items: Shaped[Tensor, "r d"],
+        before: Behaviour | None = None,
+    ) -> None:
         self.rule, self.vsa, self.samples, self.items = rule, vsa, samples, items
         self.lengths = norms(items)
         wide = torch.float32 if vsa.integer else vsa.dtype
         self.complex = wide.is_complex
         zero = torch.zeros(vsa.dim, dtype=wide, device=items.device)
-        start = torch.view_as_real(zero) if self.complex else zero
-        # Two equal roots make a program of 0; at exactly 0 they would have no gradient.
-        start = torch.full((2, *start.shape), _ROOT, dtype=start.dtype, device=items.device) if rule.sparse else start
+        program = zero if before is None else signed(before.program).detach().to(wide, copy=True)
+        start = torch.view_as_real(program) if self.complex else program
+        if rule.sparse:
+            # Two equal roots make a program of 0; at exactly 0 they would have no gradient.
+            roots = torch.full((2, *start.shape), _ROOT, dtype=start.dtype, device=items.device)
+            start = roots if before is None else (torch.stack([start, -start]).clamp(min=0) + roots**2).sqrt()
         self.parameters = start.requires_grad_()
 
     def floats(self) -> Float[Tensor, "..."]:
@@ -172,7 +209,9 @@ class _Training:
         parts = [self.scores(program, part).argmax(1) != self.samples.result[part] for part in rows.split(1024)]
         return sum(int(part.sum()) for part in parts)
 
-    def run(self, train: Tensor, held: Tensor, generator: torch.Generator) -> tuple[Tensor, int, int]:
+    def run(
+        self, train: Tensor, held: Tensor, generator: torch.Generator, progress: Progress
+    ) -> tuple[Tensor, int, int]:
         """Descend; the program, the passes and the number of steps."""
         rule = self.rule
         optimiser = torch.optim.Adam([self.parameters], lr=rule.learning_rate)
@@ -192,6 +231,7 @@ class _Training:
                     with torch.no_grad():
                         self.parameters.clamp_(min=_FLOOR)
                 step += 1
+            progress(sweep / rule.passes)
             now = self.floats().detach()
             if not len(held):
                 if sweep > rule.passes - max(round(0.3 * rule.passes), 1):
@@ -204,11 +244,6 @@ class _Training:
                 break
         answer = best if len(held) else (total / averaged).to(best.dtype)
         return self.program(answer, scaled=False), sweep, step
-
-
-def _first(samples: Samples) -> Int64[Tensor, "k"]:
-    """The result with which each condition was shown first."""
-    return samples.result[first_rows(samples.condition)]
 
 
 _ROOT = 0.1

@@ -1,6 +1,7 @@
 """The program whose answers come closest to what they shall be."""
 
 from dataclasses import dataclass
+from typing import Literal
 
 import torch
 from jaxtyping import Float, Float64, Shaped
@@ -9,7 +10,8 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
-from behaviours.learning.samples import Samples
+from behaviours.learning.samples import Contradictions, Samples, check_contradictions
+from behaviours.progress import Progress, silent
 from behaviours.recall import scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
@@ -21,8 +23,9 @@ from torchvsa.exact import is_integer, norms, signed
 class LeastSquares(Rule):
     """Answer each condition with 1 for its own result and 0 for every other one, as nearly as possible.
 
-    A condition shown with several results shall answer with the share of each. `ridge` keeps the program
-    short: it is the weight of its squared length, in units of the squared length of one stored pair.
+    A condition shown with several results shall answer with the share of each (`contradictions="all"`), or with
+    the `"first"`, the `"majority"` or the `"latest"` of them alone. `ridge` keeps the program short: it is the
+    weight of its squared length, in units of the squared length of one stored pair.
 
     The closed form needs a bind that acts on every dimension by itself, and real numbers; `fit` raises
     `ValueError` for other architectures. The program is a float vector.
@@ -34,8 +37,10 @@ class LeastSquares(Rule):
     counts = False
 
     ridge: float = 1e-3
+    contradictions: Contradictions | Literal["all"] = "all"
 
     def __post_init__(self) -> None:
+        check_contradictions(self.contradictions, "all")
         if not self.ridge > 0:
             raise ValueError(f"ridge must be above 0; got {self.ridge}")
 
@@ -44,25 +49,36 @@ class LeastSquares(Rule):
         """See `Rule.supports`: element-wise binding of real numbers."""
         return vsa.elementwise and not vsa.dtype.is_complex
 
-    def fit(self, space: Space, demonstrations: Demonstrations) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
         """See `Rule.fit`."""
-        samples = Samples.of(space, demonstrations)
+        shown = Samples.of(space, demonstrations)
+        samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
         shape = len(samples.conditions), len(samples.results)
         cells = samples.condition * shape[1] + samples.result
         counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
         items = space.results(samples.results)
         targets = counts / counts.sum(1, keepdim=True)
-        program = solve(space.vsa, samples.conditions, items, targets, self.ridge)
-        said = scores(space.vsa, program, samples.conditions, items, norms(items)).argmax(1)
+        conditions = samples.conditions[:]
+        program = solve(space.vsa, conditions, items, targets, self.ridge)
+        said = scores(space.vsa, program, conditions, items, norms(items)).argmax(1)
         report = LearningReport(
             self.name,
             samples=len(samples.condition),
             new=len(samples.conditions),
             truly_known=len(samples.condition) - len(samples.conditions),
-            contradicting=int((counts.argmax(1)[samples.condition] != samples.result).sum()),
+            contradicting=int((counts.argmax(1)[shown.condition] != shown.result).sum()),
             wrong=int((said != counts.argmax(1)).sum()),
         )
+        progress(1.0)
         return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+
+    def partial_fit(self, behaviour: Behaviour, demonstrations: Demonstrations) -> Behaviour:
+        """Raises `ValueError`: the solution alone cannot go on."""
+        raise ValueError(
+            "least squares cannot go on from a program: a further pair also needs the inverse covariance of all pairs "
+            "before it, d by d numbers that no behaviour keeps; show all demonstrations at once, to fit, or go on with "
+            "ErrorDriven or Gradient"
+        )
 
 
 def solve(

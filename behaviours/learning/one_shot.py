@@ -1,6 +1,6 @@
 """Algorithm 1 of the paper: superpose each pair once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import torch
@@ -9,11 +9,12 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
-from behaviours.learning.samples import Samples
+from behaviours.learning.samples import Contradictions, Samples, check_contradictions
+from behaviours.learning.sums import Sums
 from behaviours.ordered import first_rows, in_order_of_appearance
+from behaviours.progress import Progress, between, silent
 from behaviours.report import LearningReport
 from behaviours.space import Space
-from torchvsa.exact import divide, norms, paired_dots
 
 
 @dataclass(frozen=True)
@@ -28,25 +29,59 @@ class OneShot(Rule):
     `clip_each_step` normalises program and knownCondHV after every addition, as the printed algorithm does
     read literally; only the newest twenty or so pairs of d = 4,000 survive. By default both stay raw sums.
 
+    `contradictions`: as printed, a condition shown with several results keeps the one with which it was stored
+    (`"first"`); else each of its samples shows the `"majority"` of them (the first among equals), or the `"latest"`.
+
     Source: Neubert et al. 2016, Algorithm 1, with `encode(a_i)` in the clean-up memory for line 10's
     `actuator_i ⊗ encode(a_i)`, which Algorithm 2 could not decode.
     """
 
     name = "one_shot"
+    incremental = True
 
     known: Literal["equality", "similarity"] = "equality"
     sigmas: float = 4.0
     threshold: float | None = None
     clip_each_step: bool = False
+    contradictions: Contradictions = "first"
 
     def __post_init__(self) -> None:
+        check_contradictions(self.contradictions)
         if self.known not in ("equality", "similarity"):
             raise ValueError(f"known is decided by 'equality' or 'similarity'; got {self.known!r}")
 
-    def fit(self, space: Space, demonstrations: Demonstrations) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
         """See `Rule.fit`: the same bits as the loop over the samples, one by one."""
-        samples = Samples.of(space, demonstrations)
-        added = _Sums(space, samples, self.clip_each_step)
+        samples = Samples.of(space, demonstrations, between(progress, 0, 0.5))
+        return self._learn(space, samples, progress=between(progress, 0.5, 1))
+
+    def partial_fit(self, behaviour: Behaviour, demonstrations: Demonstrations) -> Behaviour:
+        """See `Rule.partial_fit`: with contradictions settled by the first, the same bits as `fit` on all at once.
+
+        Raises `ValueError` for `known="equality"`, and if a program that was never clipped shall be clipped now.
+        """
+        if self.known == "equality":
+            raise ValueError(
+                "a single hypervector does not remember which conditions it holds, so that no later piece can be "
+                "compared with them for equality; learn in pieces with known='similarity'"
+            )
+        vsa = behaviour.space.vsa
+        clipped = vsa.normalize(torch.zeros(vsa.dim, dtype=vsa.accumulator)).dtype
+        if self.clip_each_step and behaviour.program.dtype != clipped:
+            raise ValueError(
+                f"clip_each_step goes on from programs of {clipped}; this one is a sum in "
+                f"{behaviour.program.dtype}, so go on from behaviour.clipped()"
+            )
+        samples = Samples.of(behaviour.space, demonstrations).after(behaviour.results)
+        return self._learn(behaviour.space, samples, behaviour)
+
+    def _learn(
+        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = silent
+    ) -> Behaviour:
+        samples = shown if self.contradictions == "first" else shown.settled(self.contradictions)
+        added = Sums(space, samples, self.clip_each_step, progress)
+        if before is not None:
+            added.go_on(before.program, before.known)
         if self.known == "equality":
             # Nothing is forgotten: each condition is added where it first appears.
             added.extend(first_rows(samples.condition))
@@ -57,73 +92,16 @@ class OneShot(Rule):
             threshold = self.sigmas / space.vsa.dim**0.5 if self.threshold is None else self.threshold
             accepted = added.extend_where_dissimilar(threshold)
             stored = samples.condition[added.rows]
-        results = samples.results[in_order_of_appearance(samples.result[added.rows])]
+        held = torch.arange(0 if before is None else len(before.results), device=samples.result.device)
+        results = samples.results[in_order_of_appearance(torch.cat([held, samples.result[added.rows]]))]
         report = _count(self.name, samples, accepted, len(stored))
+        if self.contradictions != "first":
+            report = replace(report, contradicting=int((samples.result != shown.result).sum()))
+        if before is not None:
+            # What this piece never stored was known from before, or seemed to be.
+            piece = replace(report, presumed_known=report.falsely_known, falsely_known=0)
+            report = before.report.then(piece)
         return Behaviour(space, added.program, added.known, results, report)
-
-
-class _Sums:
-    """progHV and knownCondHV while pairs are added."""
-
-    def __init__(self, space: Space, samples: Samples, clip: bool) -> None:
-        self.vsa, self.samples, self.clip = space.vsa, samples, clip
-        self.items = space.results(samples.results)
-        self.rows: list[int] = []
-        like = samples.conditions
-        self.program = torch.zeros(self.vsa.dim, dtype=self.vsa.accumulator, device=like.device)
-        self.known = self.program.clone()
-
-    def extend(self, rows: Tensor) -> None:
-        """Add the pairs of these samples."""
-        if self.clip:
-            for row in rows.tolist():
-                self.add(row)
-            return
-        for block in rows.split(256):
-            conditions, pairs = self._pairs(block)
-            self.program = self.program + self.vsa.superpose(pairs)
-            self.known = self.known + self.vsa.superpose(conditions)
-        self.rows += rows.tolist()
-
-    def add(self, row: int) -> None:
-        """Add the pair of one sample (Algorithm 1, lines 6 and 7)."""
-        conditions, pairs = self._pairs(torch.tensor([row]))
-        self.program = self._bundle(self.program, pairs)
-        self.known = self._bundle(self.known, conditions)
-        self.rows.append(row)
-
-    def extend_where_dissimilar(self, threshold: float) -> Tensor:
-        """Go through the samples in order and add those that `known` does not resemble; says which."""
-        accepted = torch.zeros(len(self.samples.condition), dtype=torch.bool)
-        lengths = norms(self.samples.conditions)
-        known_length = norms(self.known)
-        version = 0
-        seen: dict[int, tuple[int, bool]] = {}
-        for row, condition in enumerate(self.samples.condition.tolist()):
-            # While nothing is added the answer for a condition cannot change.
-            asked, is_known = seen.get(condition, (-1, False))
-            if asked != version:
-                product = paired_dots(self.samples.conditions[condition], self.known)
-                # An empty memory resembles nothing, even where the threshold is negative.
-                is_known = version > 0 and bool(divide(product, known_length * lengths[condition]) > threshold)
-                seen[condition] = version, is_known
-            if not is_known:
-                self.add(row)
-                accepted[row] = True
-                known_length = norms(self.known)
-                version += 1
-        return accepted
-
-    def _pairs(self, rows: Tensor) -> tuple[Tensor, Tensor]:
-        conditions = self.samples.conditions[self.samples.condition[rows]]
-        return conditions, self.vsa.bind(conditions, self.items[self.samples.result[rows]])
-
-    def _bundle(self, total: Tensor, terms: Tensor) -> Tensor:
-        if not self.clip:
-            return total + self.vsa.superpose(terms)
-        if not self.rows:
-            return self.vsa.normalize(self.vsa.superpose(terms))
-        return self.vsa.bundle(torch.stack([total.to(terms.dtype), terms[0]]))
 
 
 def _count(rule: str, samples: Samples, accepted: Tensor, stored: int) -> LearningReport:

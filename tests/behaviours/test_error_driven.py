@@ -1,6 +1,7 @@
 """ErrorDriven keeps its promise: every pair with the margin asked for, and an honest report where it cannot."""
 
 from collections import Counter
+from collections.abc import Iterator
 from typing import Literal, cast
 
 import numpy as np
@@ -58,16 +59,15 @@ def test_a_last_pass_that_sets_all_right_leaves_nothing_wrong() -> None:
     assert (report.passes, report.updates, report.wrong) == (1, 1, 0)
 
 
-def perceptron(space_, shown: Demonstrations, margin: float, passes: int) -> np.ndarray:
-    """The rule as its docstring says it, one pair after the other, in Python's own numbers."""
+def perceptron_steps(space_, shown: Demonstrations, margin: float) -> Iterator[tuple[np.ndarray, bool]]:
+    """The rule as its docstring says it, one pair after the other, in Python's own numbers: the program after each."""
     levels = space_.schema.command_levels(shown.commands).tolist()
     results = [list(level) for level in dict.fromkeys(map(tuple, levels))]
     items = space_.results(torch.tensor(results)).numpy().astype(np.int64)
     conditions = space_.encode(space_.bins(shown.sensors)).numpy().astype(np.int64)
     program = np.zeros(space_.vsa.dim, np.int64)
     lengths = np.sqrt((items**2).sum(1))
-    for _ in range(passes):
-        corrected = False
+    while True:
         for condition, level in zip(conditions, levels, strict=True):
             own = results.index(level)
             scores = items @ (condition * program) / lengths
@@ -75,14 +75,22 @@ def perceptron(space_, shown: Demonstrations, margin: float, passes: int) -> np.
             rival = int(others.argmax())
             itself = ((condition * items[own]) ** 2).sum() / lengths[own]
             lead = scores[own] - max(others[rival], 0)
-            if lead < margin * itself or lead <= 0:
+            short = lead < margin * itself or lead <= 0
+            if short:
                 program = program + condition * items[own]
                 if others[rival] > 0:
                     program = program - condition * items[rival]
-                corrected = True
-        if not corrected:
+            yield program, short
+
+
+def perceptron(space_, shown: Demonstrations, margin: float, passes: int) -> np.ndarray:
+    """The program in the end."""
+    steps, sweep = perceptron_steps(space_, shown, margin), []
+    for _ in range(passes):
+        sweep = [next(steps) for _ in range(len(shown))]
+        if not any(short for _, short in sweep):
             break
-    return program
+    return sweep[-1][0]
 
 
 @pytest.mark.parametrize("count", [1, 7, 70])
@@ -145,3 +153,37 @@ def test_settings_that_make_no_sense() -> None:
         ErrorDriven(margin=-0.1)
     with pytest.raises(ValueError, match="passes at least 1"):
         ErrorDriven(passes=0)
+
+
+def averaged(space_, shown: Demonstrations, margin: float, passes: int) -> np.ndarray:
+    """The plain definition: the program after every visit, kept and averaged."""
+    steps, programs = perceptron_steps(space_, shown, margin), []
+    for _ in range(passes):
+        sweep = [next(steps) for _ in range(len(shown))]
+        programs += [program for program, _ in sweep]
+        if not any(corrected for _, corrected in sweep):
+            break
+    return (np.sum(programs, axis=0) / len(programs)).astype(np.float32)
+
+
+@pytest.mark.parametrize(("count", "passes"), [(1, 3), (7, 1), (7, 50), (70, 2), (70, 4)])
+def test_the_average_is_that_of_all_visits(count: int, passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    shown, made = random_pairs(count), space(256)
+    expected = averaged(made, shown, 0.49, passes)
+    for block in (1, 64):
+        monkeypatch.setattr(module, "_BLOCK", block)
+        behaviour = ErrorDriven(0.49, passes, average=True).fit(made, shown)
+        assert behaviour.program.dtype == torch.float32
+        np.testing.assert_array_equal(behaviour.program.numpy(), expected)
+
+
+@pytest.mark.parametrize("vsa", ["MAP-C", "BSC", "FHRR", "HRR"])
+def test_the_report_of_an_average_is_about_the_average(vsa: str) -> None:
+    shown = random_pairs(60)
+    last, mean = (ErrorDriven(0.5, average=average).fit(space(512, vsa), shown) for average in (False, True))
+    assert (last.report.passes, last.report.updates) == (mean.report.passes, mean.report.updates)
+    lead = leads(mean, shown)
+    # Scores of float programs: none of these leads lies within rounding of the margin.
+    assert np.abs(lead - 0.5).min() > 1e-5
+    assert mean.report.wrong == np.sum((lead < 0.5) | (lead <= 0))
+    assert last.report.wrong == 0

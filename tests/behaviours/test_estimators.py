@@ -106,6 +106,56 @@ def test_the_seed_decides_and_pickles_keep_it() -> None:
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(one)).predict_proba(X), one.predict_proba(X))
 
 
+def test_batches_are_learned_one_after_the_other() -> None:
+    X, y = load_wall_following(4)  # noqa: N806
+    order = np.random.default_rng(0).permutation(len(X))
+    model = BehaviourClassifier(dim=1000, passes=5, random_state=0)
+    for rows in np.split(order[:4000], 4):
+        model.partial_fit(X[rows], y[rows], classes=np.unique(y))
+    assert model.score(X[order[4000:]], y[order[4000:]]) > 0.97
+    assert model.behaviour_.report.samples == 4000
+    assert model.behaviour_.report.passes == 20
+
+
+def test_classes_may_come_later_than_they_are_named() -> None:
+    X, y = load_iris(return_X_y=True)  # noqa: N806
+    names = np.array(["c", "a", "b"])[y]
+    model = BehaviourClassifier(dim=500, passes=20, random_state=0)
+    model.partial_fit(X[:50], names[:50], classes=["a", "b", "c"])
+    assert model.classes_.tolist() == ["a", "b", "c"]
+    assert model.predict(X[:50]).tolist() == ["c"] * 50
+    assert model.predict_proba(X).shape == (150, 3)
+    order = np.random.default_rng(0).permutation(150)
+    model.partial_fit(X[order], names[order])
+    # The bins are those of the first batch, in which one class stood alone.
+    assert model.score(X, names) > 0.7
+    again = BehaviourClassifier(dim=500, passes=20, random_state=0).fit(X, names)
+    assert again.partial_fit(X[:10], names[:10]).score(X, names) > 0.8
+    again.partial_fit(X[:10], names[:10], classes=["c", "a", "b"])
+
+
+@pytest.mark.parametrize(
+    ("labels", "options", "words"),
+    [
+        ([0, 1], {}, "the first call of partial_fit needs all classes, at least 2; got classes=None"),
+        ([0, 0], {"classes": [0]}, "at least 2; got classes=\\[0\\]"),
+        ([0, 2], {"classes": [0, 1]}, "y holds .*2.*, which is none of the classes"),
+    ],
+)
+def test_first_batches_that_say_too_little(labels: list[int], options: Any, words: str) -> None:
+    model = BehaviourClassifier(dim=100, passes=1, random_state=0)
+    with pytest.raises(ValueError, match=words):
+        model.partial_fit([[0.0], [1.0]], labels, **options)
+
+
+def test_classes_stay_those_of_the_first_call() -> None:
+    model = BehaviourClassifier(dim=100, passes=1, random_state=0).partial_fit([[0.0], [1.0]], [0, 1], classes=[0, 1])
+    with pytest.raises(ValueError, match=r"classes are \[0 1\] since the first call; got \[0 1 2\]"):
+        model.partial_fit([[0.0]], [0], classes=[0, 1, 2])
+    with pytest.raises(ValueError, match="none of the classes"):
+        model.partial_fit([[0.0]], [5])
+
+
 def test_without_scikit_learn_the_rest_works_and_the_error_says_what_to_install(monkeypatch: Any) -> None:
     monkeypatch.delitem(sys.modules, "behaviours.estimators")
     monkeypatch.delattr(behaviours, "estimators", raising=False)

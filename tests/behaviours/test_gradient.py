@@ -28,6 +28,7 @@ def test_every_loss_learns_what_one_superposition_cannot(loss: Any, sparse: bool
 def test_one_step_follows_the_gradient_of_the_loss(sparse: bool) -> None:
     shown, made = random_pairs(20), space(200)
     samples = Samples.of(made, shown)
+    assert isinstance(samples.conditions, torch.Tensor)
     items = made.results(samples.results)
     training = module._Training(Gradient(sparse=sparse), made.vsa, samples, items)
     rows = torch.arange(20)

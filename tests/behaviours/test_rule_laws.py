@@ -30,6 +30,15 @@ def test_ten_pairs_are_recalled(rule: str, vsa: str) -> None:
     assert (behaviour(shown.sensors).familiarity > 0.5 / 10**0.5).all()
 
 
+@rules
+def test_progress_rises_to_one(rule: str) -> None:
+    shares: list[float] = []
+    RULES[rule]().fit(space(64), random_pairs(40), shares.append)
+    assert shares == sorted(shares)
+    assert min(shares) > 0
+    assert shares[-1] == 1.0
+
+
 @on_architectures
 @pytest.mark.parametrize("protection", torchvsa.PROTECTIONS)
 def test_folded_recall_is_recall_step_by_step(rule: str, vsa: str, protection: str) -> None:

@@ -79,8 +79,12 @@ def test_types_give_the_same_answers() -> None:
     reference = CleanUp(items)(queries)
     for item_type in (torch.int8, torch.int32, torch.float32, torch.float64):
         for query_type in (torch.int8, torch.int32, torch.float32):
-            for ours, theirs in zip(reference, CleanUp(items.to(item_type))(queries.to(query_type)), strict=True):
-                assert torch.equal(ours, theirs)
+            match = CleanUp(items.to(item_type))(queries.to(query_type))
+            assert torch.equal(match.index, reference.index)
+            # The length of a float query is rounded to its own type.
+            rtol, atol = (3e-7, 1e-8) if query_type == torch.float32 else (0.0, 0.0)
+            assert_close(match.similarity, reference.similarity, rtol=rtol, atol=atol)
+            assert_close(match.margin, reference.margin, rtol=rtol, atol=atol)
 
 
 def test_batches_give_the_bits_of_singles() -> None:

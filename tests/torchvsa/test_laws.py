@@ -80,6 +80,14 @@ def test_a_bundle_does_not_depend_on_order(vsa: VSA, draw: Draw) -> None:
     assert_close(vsa.bundle(xs[torch.tensor([3, 6, 0, 5, 1, 4, 2])]), vsa.bundle(xs))
 
 
+def test_two_are_bundled_as_any_number_is(vsa: VSA, draw: Draw) -> None:
+    a, b = draw(4, 3), draw(3)
+    for x, y in ((a, b), (a[0], a[1]), (vsa.bundle(a, 0), b)):
+        assert_close(
+            vsa.bundle_two(x, y), vsa.bundle(torch.stack(torch.broadcast_tensors(x, y.to(x.dtype)), -2)), rtol=0, atol=0
+        )
+
+
 @pytest.mark.parametrize("dim", [0, 1, 2, -2, -3])
 def test_bundle_sums_over_any_dimension(vsa: VSA, draw: Draw, dim: int) -> None:
     xs = draw(3, 4, 5)

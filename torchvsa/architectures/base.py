@@ -57,6 +57,11 @@ class VSA(ABC):
         """The type of a raw accumulator: int32 for integer codes, else the type of the hypervectors."""
         return torch.int32 if self.integer else self.dtype
 
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of one hypervector."""
+        return self.dim * torch.empty(0, dtype=self.dtype).element_size()
+
     # -- what an architecture defines ------------------------------------------------------------------
 
     @abstractmethod
@@ -103,14 +108,17 @@ class VSA(ABC):
         batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
         rows = x.expand(*batch, self.dim).reshape(-1, self.dim)
         starts = (-shifts).remainder(self.dim).expand(batch).reshape(-1)
-        if rows.requires_grad:
-            # The gradient of a window below would be built on all d windows of each row.
+        if rows.requires_grad or torch.compiler.is_exporting():
+            # The gradient of a window below would be built on all d windows of each row, and so would be the window in
+            # formats that know no views.
             return rows.gather(-1, (starts[:, None] + torch.arange(self.dim, device=x.device)) % self.dim).reshape(
                 *batch, self.dim
             )
         # A rotation is a window of the vector written twice: copying whole windows beats gathering elements.
-        windows = torch.cat([rows, rows], -1).unfold(-1, self.dim, 1)
-        return windows[torch.arange(len(rows), device=x.device), starts].reshape(*batch, self.dim)
+        twice = torch.cat([rows, rows], -1).flatten()
+        windows = twice.as_strided((max(twice.numel() - self.dim + 1, 0), self.dim), (1, 1))
+        first = torch.arange(rows.shape[0], device=x.device) * (2 * self.dim)
+        return windows.index_select(0, first + starts).reshape(*batch, self.dim)
 
     def superpose(
         self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
@@ -151,6 +159,10 @@ class VSA(ABC):
         Arguments as in `superpose`.
         """
         return self.normalize(self.superpose(xs, dim, weights))
+
+    def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
+        """`bundle` of `a` and `b`, element by element of the (broadcast) batch."""
+        return self.bundle(torch.stack(torch.broadcast_tensors(a, b), -2))
 
     def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
         """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""

@@ -67,7 +67,7 @@ class BSC(VSA):
 
     @staticmethod
     def _majority(raw: Tensor, tie: Tensor) -> Tensor:
-        return torch.where(raw == 0, tie, raw < 0)
+        return (raw < 0) | ((raw == 0) & tie)
 
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]

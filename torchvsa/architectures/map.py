@@ -102,6 +102,13 @@ class MAP(VSA):
             return self._signs(raw, self.permute(self.bind(*voters), 1))
         return self.normalize(raw)
 
+    def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
+        """See `VSA.bundle_two`."""
+        if self.variant != "C":
+            return super().bundle_two(a, b)
+        # Two elements of [-1, 1] add up within the codes' own type.
+        return (a + b).clamp(-1, 1).to(self.dtype)
+
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
 

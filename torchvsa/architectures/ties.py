@@ -18,7 +18,10 @@ def first_two(
         return None
     if weights is None:
         return xs[..., 0, :], xs[..., 1, :]
-    silent = (weights == 0).to(torch.int8).expand(xs.shape[:-1])
-    order = silent.argsort(dim=-1, stable=True)[..., :2, None].expand(*xs.shape[:-2], 2, xs.shape[-1])
+    # Distinct keys need no stable sort, which interchange formats lack.
+    keys = (weights == 0) * xs.shape[-2] + torch.arange(xs.shape[-2], device=xs.device)
+    order = (
+        keys.expand(xs.shape[:-1]).topk(2, -1, largest=False).indices[..., None].expand(*xs.shape[:-2], 2, xs.shape[-1])
+    )
     pair = xs.gather(-2, order)
     return pair[..., 0, :], pair[..., 1, :]

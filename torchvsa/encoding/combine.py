@@ -6,6 +6,8 @@ the entries of each record.
 """
 
 from abc import ABC, abstractmethod
+from collections.abc import Iterator
+from functools import reduce
 from typing import ClassVar
 
 import torch
@@ -14,8 +16,11 @@ from torch import Tensor
 
 from torchvsa.architectures import VSA
 
-_SIDE_BY_SIDE = 2**24
-"""Elements of looked-up entries held at once where all of a record's entries are needed together."""
+
+def _entries(table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Iterator[Tensor]:
+    """The entries `[batch, d]` of one sensor after the other; copied row by row, far faster than by plain indexing."""
+    places = torch.where(indices < 0, table.shape[1] - 1, indices)
+    return (entries.index_select(0, column) for entries, column in zip(table, places.unbind(1), strict=True))
 
 
 class Combination(ABC):
@@ -61,14 +66,13 @@ class Bundled(Combination):
         if self.vsa.breaks_ties:
             # The voters themselves decide ties, so they are needed side by side: some rows at a time.
             sensors = torch.arange(len(table), device=table.device)
-            rows = max(_SIDE_BY_SIDE // table[:, 0].numel(), 1)
-            blocks = [self.vsa.bundle(table[sensors, b], weights=(b >= 0).int()) for b in indices.split(rows)]
-            return torch.cat(blocks)
+            return self.vsa.bundle(table[sensors, indices], weights=(indices >= 0).int())
         # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
         wide = self.vsa.dtype if len(table) < 128 else self.vsa.accumulator
-        total = table[0][indices[:, 0]].to(wide)
-        for sensor in range(1, len(table)):
-            total = total + table[sensor][indices[:, sensor]]
+        entries = _entries(table, indices)
+        total = next(entries).to(wide)
+        for others in entries:
+            total += others
         return self.vsa.normalize(total)
 
 
@@ -104,10 +108,7 @@ class Bound(Combination):
 
     def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Bind all."""
-        record = table[0][indices[:, 0]]
-        for sensor in range(1, len(table)):
-            record = self.vsa.bind(record, table[sensor][indices[:, sensor]])
-        return record
+        return reduce(self.vsa.bind, _entries(table, indices))
 
 
 class SubsetBound(Bound):

@@ -85,13 +85,15 @@ class Thresholds(nn.Module):
         # Dimension by dimension: whole columns are copied and compared far faster than rows are gathered.
         columns = indices.T.contiguous()
         missing = columns < 0
-        against = torch.zeros(self.vsa.dim, len(indices), dtype=torch.bool, device=indices.device)
-        blind = ~against
+        against = blind = None
         for sensor, threshold, above in zip(self.sensor, self.threshold, self.above, strict=True):
             unseen = missing.index_select(0, sensor)
             side = columns.index_select(0, sensor) > threshold[:, None]
-            against |= (side ^ above[:, None]) & ~unseen
-            blind &= unseen
+            apart = (side ^ above[:, None]) & ~unseen
+            against = apart if against is None else against | apart
+            blind = unseen if blind is None else blind & unseen
+        assert against is not None
+        assert blind is not None
         negated = ~(against | blind).T.contiguous()
         if self.start.dtype == torch.bool:
             return self.start ^ negated

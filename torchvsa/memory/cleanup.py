@@ -7,8 +7,12 @@ import torch
 from jaxtyping import Float, Int, Shaped
 from torch import Tensor, nn
 
+from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
-from torchvsa.exact import divide, dots, norms
+from torchvsa.exact import dots, norms, scaled
+
+_PRODUCT_BYTES = 2**27
+"""Products held at once; more queries are answered some at a time."""
 
 
 class Match(NamedTuple):
@@ -24,14 +28,14 @@ class Match(NamedTuple):
 
 def best(scores: Float[Tensor, "*batch k"], lengths: Float[Tensor, "*batch"]) -> Match:
     """The best of `k` scores (inner products over the items' lengths), as cosines with queries of these lengths."""
-    index = scores.argmax(-1)
-    top = scores.amax(-1)
+    top, index = scores.max(-1)
     if scores.shape[-1] == 1:
-        margin = torch.full_like(top, torch.inf)
+        lead = torch.full_like(top, torch.inf)
     else:
-        rivals = scores.scatter(-1, index[..., None], -torch.inf)
-        margin = divide(top - rivals.amax(-1), lengths)
-    return Match(index, divide(top, lengths).to(torch.float32), margin.to(torch.float32))
+        lead = top - scores.scatter(-1, index[..., None], -torch.inf).amax(-1)
+    # A query of length 0 has the score 0 with every item.
+    lengths = torch.where(lengths > 0, lengths, 1.0)
+    return Match(index, (top / lengths).to(torch.float32), (lead / lengths).to(torch.float32))
 
 
 class CleanUp(nn.Module):
@@ -69,5 +73,15 @@ class CleanUp(nn.Module):
             raise ShapeError(
                 f"queries must end in d = {self.items.shape[-1]} elements; got shape {tuple(queries.shape)}"
             )
-        scores = divide(dots(queries, self.items).to(torch.float64), self.lengths)
-        return best(scores, norms(queries))
+        rows = queries.reshape(-1, queries.shape[-1])
+        match = by_blocks(self._best, rows, row_bytes=8 * len(self.items), block_bytes=_PRODUCT_BYTES)
+        return Match(*(answer.reshape(queries.shape[:-1]) for answer in match))
+
+    def _best(self, rows: Shaped[Tensor, "batch d"]) -> Match:
+        # No item wins by the length of the query, so that floats may round it: that is read off in one pass.
+        lengths = torch.linalg.vector_norm(rows, dim=-1) if rows.is_floating_point() else norms(rows)
+        # The products of many rows are found fastest together, and looked through while in the cache.
+        return by_blocks(self._look_through, dots(rows, self.items), lengths, row_bytes=24 * len(self.items))
+
+    def _look_through(self, products: Shaped[Tensor, "batch k"], lengths: Float[Tensor, "batch"]) -> Match:
+        return best(scaled(products, self.lengths), lengths)

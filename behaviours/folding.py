@@ -1,0 +1,98 @@
+"""What of a recall does not depend on the condition, computed once for a program."""
+
+from typing import NamedTuple
+
+import torch
+from jaxtyping import Float64, Int8, Int64, Shaped
+from torch import Tensor, nn
+
+from torchvsa import VSA
+from torchvsa.exact import dots, is_integer, norms, scaled, signed
+
+
+class Answers(NamedTuple):
+    """What a program says to a batch of conditions."""
+
+    scores: Float64[Tensor, "batch k"]
+    """How strongly it answers with each item: `<unbind(program, c), item> / |item|`."""
+    lengths: Float64[Tensor, "batch"]
+    """The lengths of the noisy results, `|unbind(program, c)|`."""
+    familiarity: Float64[Tensor, "batch"]
+    """The cosine of each condition with the known conditions."""
+
+
+class Folded(nn.Module):
+    """A program folded into the items that it can answer with: `<c ⊗ p, item> = <c, p ⊗ item>`.
+
+    A batch of conditions is then answered by one matrix product. Where architecture and program are integers and bind
+    element by element, the numbers are written in base 256, digits from -128 to 127: products with the int8 conditions
+    are exact, and as fast as the CPU's integer units. The noisy result's length is the root of `c² · p²`.
+    """
+
+    program: Tensor
+    known: Tensor
+    rows: Tensor
+    item_lengths: Tensor
+    known_length: Tensor
+    linear: Tensor
+    linear_weights: Tensor
+    square: Tensor
+    square_weights: Tensor
+
+    def __init__(
+        self,
+        vsa: VSA,
+        program: Shaped[Tensor, "d"],
+        known: Shaped[Tensor, "d"],
+        items: Shaped[Tensor, "k d"],
+    ) -> None:
+        super().__init__()
+        self.vsa = vsa
+        tables = {
+            "program": program,
+            "known": known,
+            "rows": vsa.unbind(program, items),
+            "item_lengths": norms(items),
+            "known_length": norms(known),
+        }
+        whole = vsa.integer and vsa.elementwise and all(is_integer(x) for x in (program, known, items))
+        # How many digits it takes depends on the values, which no graph may look at.
+        self.digital = whole and program.device.type == "cpu" and not torch.compiler.is_compiling()
+        if self.digital:
+            votes = torch.cat([signed(tables["rows"]), signed(known)[None]])
+            tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64))
+            square = signed(program).to(torch.int64) ** 2
+            tables["square"], tables["square_weights"] = _digits(torch.stack([square, torch.ones_like(square)]))
+        for name, table in tables.items():
+            self.register_buffer(name, table, persistent=False)
+
+    def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Answers:
+        """Ask for encoded and protected conditions."""
+        codes = signed(conditions)
+        digital = self.digital and codes.dtype == torch.int8 and codes.device.type == "cpu"
+        if not digital or torch.compiler.is_exporting():
+            scores = scaled(dots(conditions, self.rows), self.item_lengths)
+            resemblance, length = dots(conditions, self.known[None])[:, 0], norms(conditions)
+            noise = self.vsa.unbound_norm(self.program, conditions)
+            return Answers(scores, noise, scaled(resemblance, length * self.known_length))
+        products = _joined(dots(codes, self.linear), self.linear_weights)
+        # Codes of one byte are -1, 0 or +1 in every architecture, and so are their squares.
+        squares = _joined(dots(codes * codes, self.square), self.square_weights).sqrt()
+        familiarity = scaled(products[:, -1], squares[:, 1] * self.known_length)
+        return Answers(scaled(products[:, :-1], self.item_lengths), squares[:, 0], familiarity)
+
+
+def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], Float64[Tensor, "digits"]]:
+    """Each row as the rows of its digits in base 256, lowest first, and the weights of the digits."""
+    digits = []
+    while not digits or x.any():
+        low = (x + 128) % 256 - 128
+        digits.append(low.to(torch.int8))
+        x = (x - low) // 256
+    return torch.stack(digits, 1).flatten(0, 1), 256.0 ** torch.arange(len(digits), dtype=torch.float64)
+
+
+def _joined(products: Shaped[Tensor, "batch rows_digits"], weights: Float64[Tensor, "digits"]) -> Tensor:
+    """Products with digits as products with the numbers, exact below 2^53."""
+    wide = products.to(torch.float64)
+    return wide if len(weights) == 1 else wide.view(len(wide), -1, len(weights)) @ weights

@@ -1,0 +1,100 @@
+"""The distinct conditions of a demonstration: held as hypervectors, or encoded whenever they are asked for."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import torch
+from jaxtyping import Int64, Shaped
+from torch import Tensor
+
+from behaviours.ordered import distinct_rows
+from behaviours.progress import Progress, silent
+from behaviours.space import Space
+from torchvsa.exact import dots
+
+HELD_BYTES = 2**29
+"""Conditions that take no more are held as hypervectors."""
+_ROWS = 2048
+"""Conditions encoded at once, where not all of them are held."""
+
+
+class Conditions:
+    """`k` conditions of which the bins alone are held; indexed like a tensor `[k, d]`, it encodes what is asked for.
+
+    A million conditions of d = 4,000 bytes would take 4 GB, their bins a twentieth of it.
+    """
+
+    def __init__(self, space: Space, bins: Int64[Tensor, "k n"]) -> None:
+        self.space, self.bins = space, bins
+
+    def __len__(self) -> int:
+        return len(self.bins)
+
+    @property
+    def device(self) -> torch.device:
+        """Where they are encoded."""
+        return self.bins.device
+
+    def __getitem__(self, index: Any) -> Shaped[Tensor, "*some d"]:
+        rows = self.bins[index]
+        return self.space.encode(rows[None])[0] if rows.dim() == 1 else self.space.encode(rows)
+
+    def index_select(self, dim: int, index: Int64[Tensor, "some"]) -> Shaped[Tensor, "some d"]:
+        """The conditions with these numbers (`dim` is 0)."""
+        return self[index]
+
+    def split(self, size: int) -> Iterator[Shaped[Tensor, "some d"]]:
+        """All of them in order, `size` at a time."""
+        return (self.space.encode(rows) for rows in self.bins.split(size))
+
+
+def encode_distinct(
+    space: Space, bins: Int64[Tensor, "N n"], progress: Progress = silent
+) -> tuple["Shaped[Tensor, 'k d'] | Conditions", Int64[Tensor, "N"]]:
+    """The distinct conditions of these rows, in order of first appearance, and which of them each row has.
+
+    Conditions are the same if their hypervectors are. Rows of equal bins are found first, and only one of each is
+    encoded. `progress` is told the share that is done.
+    """
+    distinct, condition = distinct_rows(bins)
+    if len(distinct) * space.vsa.row_bytes <= HELD_BYTES:
+        encoded, merged = distinct_rows(space.encode(distinct))
+        return encoded, merged[condition]
+    first, merged = _merged(space, distinct, progress)
+    return Conditions(space, distinct[first]), merged[condition]
+
+
+def _merged(
+    space: Space, bins: Int64[Tensor, "k n"], progress: Progress
+) -> tuple[Int64[Tensor, "c"], Int64[Tensor, "k"]]:
+    """The row in which each distinct hypervector appears first, and for each row which of them it has.
+
+    Hypervectors are compared by fingerprints, and equal ones then in full.
+    """
+    seed = 0
+    while True:
+        prints = []
+        for start, rows in enumerate(bins.split(_ROWS)):
+            prints.append(_fingerprints(space.encode(rows), seed))
+            progress(min((start + 1) * _ROWS / len(bins), 1.0))
+        distinct, merged = distinct_rows(torch.cat(prints))
+        first = torch.full((len(distinct),), len(bins), device=bins.device)
+        first = first.scatter_reduce(0, merged, torch.arange(len(bins), device=bins.device), "amin")
+        later = (first[merged] != torch.arange(len(bins), device=bins.device)).nonzero()[:, 0]
+        same = (
+            torch.equal(space.encode(bins[some]), space.encode(bins[first[merged[some]]]))
+            for some in later.split(_ROWS)
+        )
+        if all(same):
+            return first, merged
+        seed += 1  # all but impossible: other fingerprints tell them apart
+
+
+def _fingerprints(conditions: Shaped[Tensor, "some d"], seed: int) -> Int64[Tensor, "some 8"]:
+    """Eight random sums of each hypervector's bytes."""
+    real = torch.view_as_real(conditions.resolve_conj()).flatten(1) if conditions.is_complex() else conditions
+    # Adding zero leaves no -0.0, which equals 0.0 but has other bytes.
+    content = (real + 0.0 if real.is_floating_point() else real).contiguous().view(torch.int8)
+    generator = torch.Generator().manual_seed(seed)
+    keys = torch.randint(-127, 128, (8, content.shape[1]), dtype=torch.int8, generator=generator)
+    return dots(content, keys.to(content.device)).to(torch.int64)

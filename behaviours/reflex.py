@@ -1,0 +1,40 @@
+"""A behaviour made ready to be asked at every control tick."""
+
+from typing import TYPE_CHECKING, Any
+
+import torch
+from torch import Tensor, nn
+
+from behaviours.folding import Folded
+from behaviours.recall import Recall
+from torchvsa.memory import best
+
+if TYPE_CHECKING:
+    from behaviours.behaviour import Behaviour
+
+
+class Reflex(nn.Module):
+    """Answers readings `[B, n]` as its behaviour does, bit for bit, from tables that are computed once.
+
+    Changes of the behaviour do not reach it. It is the form to compile:
+
+        tick = torch.compile(Reflex(behaviour), fullgraph=True)
+        tick(torch.tensor([[0.3, 1.2, 0.5]], dtype=torch.float64)).commands
+    """
+
+    commands: Tensor
+
+    def __init__(self, behaviour: "Behaviour") -> None:
+        super().__init__()
+        self.space = behaviour.space
+        self.folded = Folded(behaviour.space.vsa, behaviour.program, behaviour.known, behaviour.memory.items)
+        self.register_buffer("commands", behaviour.memory.commands, persistent=False)
+
+    def forward(self, readings: Any) -> Recall:
+        """Commands, similarity, margin and familiarity; see `Behaviour.forward`."""
+        bins = self.space.bins(readings)
+        answers = self.folded(self.space.encode(bins))
+        match = best(answers.scores, answers.lengths)
+        familiarity = answers.familiarity.to(torch.float32)
+        recall = Recall(self.commands[match.index], match.similarity, match.margin, familiarity)
+        return recall.blank((bins < 0).all(-1))

@@ -1,0 +1,69 @@
+"""The command `python -m benchmarks`."""
+
+import argparse
+import json
+import platform
+from pathlib import Path
+from typing import Any
+
+import torch
+from rich.console import Console
+
+from behaviours.storage import write_atomically
+from benchmarks import cleanup, encoding, growth, imports, learning, protection, random_vectors, recall, rollouts
+from benchmarks.harness import time_case
+from benchmarks.report import draw, print_rows
+
+WORKS = {
+    "encoding": encoding,
+    "cleanup": cleanup,
+    "protection": protection,
+    "random": random_vectors,
+    "learning": learning,
+    "recall": recall,
+    "rollouts": rollouts,
+    "imports": imports,
+}
+FOLDER = Path(__file__).parent
+
+
+def main() -> None:
+    """Measure, print the table, write `results.json` and draw it into `docs/`."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside peers, in one process.")
+    parser.add_argument("--only", nargs="+", choices=[*WORKS, "growth"], help="these works alone")
+    parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--repeats", type=int, default=7, help="timed runs of each call, after one to warm up")
+    parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
+    parser.add_argument("--small", action="store_true", help="tiny sizes, to see that all works")
+    parser.add_argument("--out", type=Path, default=FOLDER / "results.json")
+    parser.add_argument("--figure", type=Path, default=FOLDER.parent / "docs" / "benchmarks.png")
+    options = parser.parse_args()
+    console = Console()
+    if not console.is_terminal:
+        console.width = 160  # a file has no width of its own; the table needs this much
+    rows: list[dict[str, Any]] = []
+    for name in options.only or [*WORKS, "growth"]:
+        if name == "growth":
+            rows += growth.rows(options.device, max(options.threads), small=options.small)
+            continue
+        for case in WORKS[name].cases(options.device, options.small):
+            for threads in options.threads:
+                console.print(f"{case.work}, {case.shape}, {threads} threads", style="dim")
+                rows += time_case(case, threads, options.repeats, options.device)
+    machine = torch.cuda.get_device_name() if options.device == "cuda" else f"{_processor()}, torch {torch.__version__}"
+    for row in rows:
+        row["machine"] = machine
+    print_rows(rows, console)
+    write_atomically(options.out, (json.dumps(rows, indent=1) + "\n").encode())
+    write_atomically(options.figure, draw(rows))
+    console.print(f"{options.out} and {options.figure} hold it")
+
+
+def _processor() -> str:
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    return names[0] if names else platform.processor()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,26 @@
+"""What the benchmarks of learning and recall share: the teacher's runs in the corral, and the paper's codebooks."""
+
+from functools import cache
+
+import torch
+
+import sim
+from behaviours import Demonstrations, Encoder, Space
+from experiments import presets
+from torchvsa import MAP
+
+
+@cache
+def samples(count: int) -> Demonstrations:
+    """The first control steps of the teacher's runs."""
+    episodes = range(max(2, count // 220))
+    steps = sim.rollout(sim.Teacher(), episodes=episodes, record=True).trajectory
+    if len(steps.sensors) < count:
+        raise ValueError(f"{len(episodes)} episodes have {len(steps.sensors)} steps; {count} are needed")
+    return Demonstrations(steps.sensors[:count], steps.commands[:count])
+
+
+def space(dim: int, device: str) -> Space:
+    """The paper's: 32 lookup codes, bundled, behind the self-derived shift with the mean width."""
+    vsa = MAP(dim, dtype=torch.int8)
+    return Space(presets.schema(), vsa, Encoder(32), {"name": "self_shift", "width": "mean"}).to(device)

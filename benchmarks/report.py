@@ -1,0 +1,71 @@
+"""The table of a benchmark on the terminal, and as a figure."""
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from matplotlib.figure import Figure
+from rich.console import Console
+from rich.table import Table
+
+Row = dict[str, Any]
+
+
+def print_rows(rows: Sequence[Row], console: Console) -> None:
+    """Ratios to the peers, then exponents of growth."""
+    compared = [row for row in rows if "exponent" not in row]
+    if compared:
+        table = Table(title=rows[0]["machine"])
+        for title in ("work", "shape", "threads", "ours", "peer", "theirs", "ratio", "floor", "of floor"):
+            table.add_column(title, justify="left" if title in ("work", "shape", "peer", "floor") else "right")
+        for row in compared:
+            ratio = "-" if row["ratio"] is None else f"{row['ratio']:.1f}"
+            above = "-" if row["of_floor"] is None else f"{row['of_floor']:.1f}"
+            table.add_row(
+                row["work"], row["shape"], str(row["threads"]), time_of(row["ours_s"]), row["peer"] or "-",
+                time_of(row["peer_s"]), ratio, row["floor"] or "-", above,
+            )  # fmt: skip
+        console.print(table)
+    grown = [row for row in rows if "exponent" in row]
+    if grown:
+        table = Table(title="time = size ^ exponent")
+        for title in ("work", "sizes", "longest", "exponent", "at the top"):
+            table.add_column(title, justify="right")
+        for row in grown:
+            exponents = (f"{row['exponent']:.2f}", f"{row['exponent_at_the_top']:.2f}")
+            table.add_row(row["work"], row["shape"], time_of(row["ours_s"]), *exponents)
+        console.print(table)
+
+
+def time_of(seconds: float | None) -> str:
+    """A time in the unit that suits it."""
+    if seconds is None:
+        return "-"
+    if seconds < 1e-3:
+        return f"{seconds * 1e6:.0f} µs"
+    return f"{seconds * 1e3:.2f} ms" if seconds < 1 else f"{seconds:.2f} s"
+
+
+def draw(rows: Sequence[Row]) -> bytes:
+    """A PNG: how many times faster than each peer, on a logarithmic axis, a dot for each number of threads."""
+    compared = [row for row in rows if row.get("ratio") is not None]
+    names = list(dict.fromkeys((row["work"], row["shape"], row["peer"]) for row in compared))
+    figure = Figure(figsize=(10, 1.2 + 0.42 * max(len(names), 1)), layout="constrained")
+    axes = figure.subplots()
+    threads = sorted({row["threads"] for row in compared})
+    for count, colour in zip(threads, ("#4477aa", "#ee6677", "#228833"), strict=False):
+        own = [row for row in compared if row["threads"] == count]
+        heights = [names.index((row["work"], row["shape"], row["peer"])) for row in own]
+        axes.plot([row["ratio"] for row in own], heights, "o", color=colour, label=f"{count} thread{'s' * (count > 1)}")
+    axes.axvline(1, color="0.4", linewidth=1)
+    axes.set_xscale("log")
+    axes.set_yticks(range(len(names)), [f"{work}, {shape}\nbeside {peer}" for work, shape, peer in names], fontsize=7)
+    axes.invert_yaxis()
+    axes.grid(axis="x", which="both", color="0.9")
+    axes.set_xlabel("times faster than the peer")
+    if compared:
+        axes.set_title(rows[0]["machine"], fontsize=9)
+        axes.legend()
+    content = io.BytesIO()
+    figure.savefig(content, format="png", dpi=130)
+    return content.getvalue()

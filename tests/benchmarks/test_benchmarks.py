@@ -1,0 +1,80 @@
+"""The benchmarks at tiny sizes: everything runs, ours and peers answer the same, and rows say what was measured."""
+
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+
+from benchmarks.harness import INPUTS, Case, Floor, time_case
+
+COLUMNS = {
+    "work", "shape", "threads", "ours_s", "peer", "peer_s", "ratio", "floor", "floor_s", "of_floor", "device",
+    "machine",
+}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_command_measures_every_work(tmp_path: Path) -> None:
+    # Each case compares its answers with the peers' before it is timed.
+    command = [sys.executable, "-m", "benchmarks", "--small", "--repeats", "1", "--threads", "1"]
+    files = ["--out", str(tmp_path / "rows.json"), "--figure", str(tmp_path / "rows.png")]
+    done = subprocess.run(
+        [*command, *files], cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    rows: list[dict[str, Any]] = json.loads((tmp_path / "rows.json").read_text())
+    compared = [row for row in rows if "exponent" not in row]
+    works = {row["work"].split(",")[0] for row in compared}
+    assert works == {
+        "record encoding", "clean-up", "protect", "random hypervectors", "Algorithm 1", "Algorithm 2", "rollouts",
+        "import beyond torch",
+    }  # fmt: skip
+    for row in compared:
+        assert set(row) >= COLUMNS
+        assert row["ratio"] == row["peer_s"] / row["ours_s"]
+        assert row["floor"] is None or row["of_floor"] == row["ours_s"] / row["floor_s"]
+        assert row["work"] in done.stdout or "…" in done.stdout
+    for row in rows:
+        if "exponent" in row:
+            slope = math.log(row["seconds"][1] / row["seconds"][0]) / math.log(row["sizes"][1] / row["sizes"][0])
+            assert row["exponent"] == pytest.approx(slope)
+    assert (tmp_path / "rows.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_calls_alternate_and_inputs_rotate() -> None:
+    order: list[tuple[str, int]] = []
+    case = Case(
+        "w",
+        "s",
+        lambda index: order.append(("ours", index)),
+        {"a": lambda index: order.append(("a", index)), "b": lambda index: order.append(("b", index))},
+        check=lambda: order.append(("check", 0)),
+        floor=Floor("f", lambda index: order.append(("floor", index)), share=2.0),
+    )
+    rows = time_case(case, threads=1, repeats=INPUTS, device="cpu")
+    names = [name for name, _ in order]
+    assert names[0] == "check"
+    # Once to warm up; then each is called untimed and timed, in turns.
+    turns = ["ours", "a", "b", "floor"]
+    assert names[1:5] == turns
+    assert names[5:] == [name for _ in range(INPUTS) for turn in turns for name in (turn, turn)]
+    assert {index for name, index in order if name == "ours"} == set(range(INPUTS))
+    assert [row["peer"] for row in rows] == ["a", "b"]
+
+
+def test_an_answer_that_differs_stops_the_benchmark() -> None:
+    def differs() -> None:
+        assert torch.equal(torch.zeros(1), torch.ones(1))
+
+    called: list[int] = []
+    case = Case("w", "s", called.append, {}, check=differs)
+    before = torch.get_num_threads()
+    with pytest.raises(AssertionError):
+        time_case(case, threads=1, repeats=1, device="cpu")
+    assert not called
+    assert torch.get_num_threads() == before

@@ -1,0 +1,29 @@
+"""Work on many rows, a block of them at a time."""
+
+from collections.abc import Callable, Iterable
+from typing import Any, TypeVar, cast
+
+import torch
+from torch import Tensor
+
+CACHE_BYTES = 2**22
+"""Fits the second-level cache of common CPUs, where what lies between two steps is read back fast."""
+
+Answer = TypeVar("Answer", bound=Tensor | tuple[Any, ...])
+
+
+def by_blocks(work: Callable[..., Answer], *rows: Tensor, row_bytes: int, block_bytes: int = CACHE_BYTES) -> Answer:
+    """`work(*rows)`, on blocks of rows that take `block_bytes` between steps if one row takes `row_bytes`.
+
+    `work` maps tensors `[N, ...]` to one tensor `[N, ...]`, or a named tuple of them (or None), row by row: the answer
+    is the same at any block size. Only a CPU gains from it; a GPU and a compiler get all rows at once.
+    """
+    count = max(block_bytes // max(row_bytes, 1), 1)
+    if torch.compiler.is_compiling() or rows[0].device.type != "cpu" or len(rows[0]) <= count:
+        return work(*rows)
+    parts = [work(*some) for some in zip(*(tensor.split(count) for tensor in rows), strict=True)]
+    first = parts[0]
+    if isinstance(first, Tensor):
+        return cast(Any, torch.cat(cast(list[Tensor], parts)))
+    columns: Iterable[Any] = zip(*parts, strict=True)
+    return cast(Any, type(first))(*(None if column[0] is None else torch.cat(column) for column in columns))
