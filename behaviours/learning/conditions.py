@@ -12,7 +12,7 @@ from behaviours.progress import Progress, silent
 from behaviours.space import Space
 from torchvsa.exact import dots
 
-HELD_BYTES = 2**29
+HELD_BYTES = 2**27
 """Conditions that take no more are held as hypervectors."""
 _ROWS = 2048
 """Conditions encoded at once, where not all of them are held."""

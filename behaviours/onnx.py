@@ -1,0 +1,112 @@
+"""ONNX files of behaviours, for robots that run no Python: one call of onnxruntime answers with commands.
+
+The only module of the behaviours that needs the packages of the extra `onnx`; nothing loads it by itself.
+"""
+
+import json
+import logging
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor, nn
+
+from behaviours.behaviour import Behaviour
+from behaviours.composition.base import Policy
+from behaviours.storage import write_atomically
+
+OUTPUTS = ("commands", "similarity", "margin", "familiarity", "speaker")
+"""The outputs of a file: those of `Recall`, `speaker` for policies only."""
+
+
+def to_onnx(behaviour: Behaviour | Policy, path: str | Path) -> Path:
+    """Write a behaviour, or a policy, to one ONNX file, whole or not at all.
+
+    | | name | type and shape |
+    |---|---|---|
+    | input | `readings` | float64 `[batch, n]`; NaN is not observed, values out of range count as the nearest bound |
+    | outputs | `commands` | float64 `[batch, m]`; NaN where no sensor was observed |
+    | | `similarity`, `margin`, `familiarity` | float32 `[batch]`, see `Recall` |
+    | | `speaker` | int64 `[batch]`, for a policy only |
+
+    The file holds codebooks, program and clean-up memory as they are now, and the names of sensors and actuators as
+    JSON in its metadata. Integer codes answer exactly what the module does. (`torch.onnx.export(behaviour, (readings,),
+    dynamo=True, dynamic_shapes=({0: "batch"},))` writes the same graph.)
+
+    Raises `ImportError` without the packages, and `ValueError` for complex codes (FHRR), which ONNX does not know.
+
+        >>> to_onnx(bank["seek_light"], "seek_light.onnx")                                  # doctest: +SKIP
+        >>> session = onnxruntime.InferenceSession("seek_light.onnx")                       # doctest: +SKIP
+        >>> commands, similarity, *_ = session.run(None, {"readings": readings.numpy()})    # doctest: +SKIP
+    """
+    space = behaviour.space
+    if space.vsa.dtype.is_complex:
+        raise ValueError(
+            f"ONNX knows no complex numbers, so that {space.vsa} cannot be written; use a real architecture"
+        )
+    answer = _Answer(behaviour)
+    names = list(OUTPUTS if isinstance(behaviour, Policy) else OUTPUTS[:-1])
+    # Two rows: one alone would be taken for the size of every batch.
+    rows = torch.zeros(2, len(space.schema.sensors), dtype=torch.float64)
+    try:
+        with _quiet(), _evaluating(answer):
+            # Exported by hand, since the converter would turn to a fixed size where the batch cannot stay open.
+            graph = torch.export.export(answer, (rows,), dynamic_shapes=({0: torch.export.Dim("batch")},))
+            made = torch.onnx.export(
+                graph,
+                dynamo=True,
+                input_names=["readings"],
+                output_names=names,
+                verbose=False,
+            )
+    except (ModuleNotFoundError, torch.onnx.OnnxExporterError) as error:
+        missing = error if isinstance(error, ModuleNotFoundError) else error.__cause__
+        if isinstance(missing, ModuleNotFoundError):
+            raise ImportError(f"ONNX files need more packages: pip install 'torchvsa[onnx]' ({missing})") from error
+        raise
+    assert made is not None
+    model = made.model_proto
+    for key, parts in (("sensors", space.schema.sensors), ("actuators", space.schema.actuators)):
+        model.metadata_props.add(key=key, value=json.dumps([part.name for part in parts]))
+    return write_atomically(path, model.SerializeToString())
+
+
+class _Answer(nn.Module):
+    """A behaviour whose answer is a plain tuple."""
+
+    def __init__(self, behaviour: Behaviour | Policy) -> None:
+        super().__init__()
+        self.behaviour = behaviour
+
+    def forward(self, readings: Tensor) -> tuple[Any, ...]:
+        return tuple(part for part in self.behaviour(readings) if part is not None)
+
+
+@contextmanager
+def _evaluating(module: nn.Module) -> Iterator[None]:
+    """Modes as the exporter wants them, and afterwards as they were; no behaviour depends on them."""
+    before = [(part, part.training) for part in module.modules()]
+    module.eval()
+    try:
+        yield
+    finally:
+        for part, training in before:
+            part.training = training
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Without the exporter's remarks on its own parts."""
+    log = logging.getLogger("torch.onnx")
+    level = log.level
+    log.setLevel(logging.ERROR)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)
+            warnings.simplefilter("ignore", DeprecationWarning)
+            yield
+    finally:
+        log.setLevel(level)
