@@ -8,6 +8,7 @@ from behaviours.composition import POLICIES, Bundle, Policy, Priority
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import RULES, ErrorDriven, Gradient, LeastSquares, OneShot, Rule
 from behaviours.recall import Recall
+from behaviours.reflex import Reflex
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Encoder, Space
@@ -33,6 +34,7 @@ __all__ = [
     "Policy",
     "Priority",
     "Recall",
+    "Reflex",
     "Rule",
     "Schema",
     "Sensor",

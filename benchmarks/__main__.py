@@ -12,7 +12,7 @@ from rich.console import Console
 from behaviours.storage import write_atomically
 from benchmarks import cleanup, encoding, growth, imports, learning, protection, random_vectors, recall, rollouts
 from benchmarks.harness import time_case
-from benchmarks.report import draw, print_rows
+from benchmarks.report import draw, fill, print_rows
 
 WORKS = {
     "encoding": encoding,
@@ -36,7 +36,7 @@ def main() -> None:
     parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     parser.add_argument("--small", action="store_true", help="tiny sizes, to see that all works")
     parser.add_argument("--out", type=Path, default=FOLDER / "results.json")
-    parser.add_argument("--figure", type=Path, default=FOLDER.parent / "docs" / "benchmarks.png")
+    parser.add_argument("--docs", type=Path, default=FOLDER.parent / "docs", help="where benchmarks.md and .png lie")
     options = parser.parse_args()
     console = Console()
     if not console.is_terminal:
@@ -55,8 +55,9 @@ def main() -> None:
         row["machine"] = machine
     print_rows(rows, console)
     write_atomically(options.out, (json.dumps(rows, indent=1) + "\n").encode())
-    write_atomically(options.figure, draw(rows))
-    console.print(f"{options.out} and {options.figure} hold it")
+    write_atomically(options.docs / "benchmarks.png", draw(rows))
+    fill(options.docs / "benchmarks.md", rows)
+    console.print(f"{options.out} and {options.docs / 'benchmarks.md'} hold it")
 
 
 def _processor() -> str:

@@ -2,11 +2,14 @@
 
 import io
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from matplotlib.figure import Figure
 from rich.console import Console
 from rich.table import Table
+
+from behaviours.storage import write_atomically
 
 Row = dict[str, Any]
 
@@ -35,6 +38,36 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
             exponents = (f"{row['exponent']:.2f}", f"{row['exponent_at_the_top']:.2f}")
             table.add_row(row["work"], row["shape"], time_of(row["ours_s"]), *exponents)
         console.print(table)
+
+
+def fill(page: Path, rows: Sequence[Row]) -> None:
+    """Write the tables of a page anew, between their marks."""
+    compared = [row for row in rows if "exponent" not in row]
+    grown = [row for row in rows if "exponent" in row]
+    text = page.read_text()
+    if compared:
+        lines = ["| work | size | threads | ours | peer | theirs | ratio | floor | times the floor |"]
+        lines.append("|---|---|---:|---:|---|---:|---:|---|---:|")
+        for row in compared:
+            ratio = "-" if row["ratio"] is None else f"{row['ratio']:.1f}"
+            above = "-" if row["of_floor"] is None else f"{row['of_floor']:.1f}"
+            cells = (row["work"], row["shape"], row["threads"], time_of(row["ours_s"]), row["peer"] or "-")
+            more = (time_of(row["peer_s"]), ratio, row["floor"] or "-", above)
+            lines.append(f"| {' | '.join(map(str, (*cells, *more)))} |")
+        text = _between(text, "table", [f"{compared[0]['machine']}:", "", *lines])
+    if grown:
+        lines = ["| work | sizes | time of the largest | exponent | at the top |", "|---|---|---:|---:|---:|"]
+        for row in grown:
+            exponents = f"{row['exponent']:.2f} | {row['exponent_at_the_top']:.2f}"
+            lines.append(f"| {row['work']} | {row['shape']} | {time_of(row['ours_s'])} | {exponents} |")
+        text = _between(text, "growth", lines)
+    write_atomically(page, text.encode())
+
+
+def _between(text: str, mark: str, lines: Sequence[str]) -> str:
+    begin, end = f"<!-- {mark}: begin -->", f"<!-- {mark}: end -->"
+    before, rest = text.split(begin)
+    return "\n".join([before + begin, *lines, end + rest.split(end)[1]])
 
 
 def time_of(seconds: float | None) -> str:

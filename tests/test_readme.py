@@ -11,19 +11,25 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-def python_block() -> str:
-    (block,) = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
-    return block
+FIRST, SECOND = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+
+
+def run(code: str) -> str:
+    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
 
 
 def test_the_ten_lines_run_and_answer() -> None:
-    lines = [line for line in python_block().splitlines() if line.strip()]
+    lines = [line for line in FIRST.splitlines() if line.strip()]
     assert len(lines) == 10
-    code = python_block() + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
+    code = FIRST + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
     code += "assert 'program' in steer.state_dict() and steer.program.shape == (4000,)\n"
-    run = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stderr
-    assert "program" in run.stdout
+    assert "program" in run(code)
+
+
+def test_the_classifier_scores_what_one_would_hope() -> None:
+    assert float(run(SECOND)) > 0.99
 
 
 def test_the_files_that_it_names_are_there() -> None:

@@ -12,6 +12,7 @@ import torch
 
 from benchmarks.harness import INPUTS, Case, Floor, time_case
 
+ROOT = Path(__file__).parents[2]
 COLUMNS = {
     "work", "shape", "threads", "ours_s", "peer", "peer_s", "ratio", "floor", "floor_s", "of_floor", "device",
     "machine",
@@ -22,10 +23,10 @@ COLUMNS = {
 def test_the_command_measures_every_work(tmp_path: Path) -> None:
     # Each case compares its answers with the peers' before it is timed.
     command = [sys.executable, "-m", "benchmarks", "--small", "--repeats", "1", "--threads", "1"]
-    files = ["--out", str(tmp_path / "rows.json"), "--figure", str(tmp_path / "rows.png")]
-    done = subprocess.run(
-        [*command, *files], cwd=Path(__file__).parents[2], capture_output=True, text=True, check=False
-    )
+    files = ["--out", str(tmp_path / "rows.json"), "--docs", str(tmp_path)]
+    page = (ROOT / "docs" / "benchmarks.md").read_text()
+    (tmp_path / "benchmarks.md").write_text(page)
+    done = subprocess.run([*command, *files], cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     rows: list[dict[str, Any]] = json.loads((tmp_path / "rows.json").read_text())
     compared = [row for row in rows if "exponent" not in row]
@@ -43,7 +44,13 @@ def test_the_command_measures_every_work(tmp_path: Path) -> None:
         if "exponent" in row:
             slope = math.log(row["seconds"][1] / row["seconds"][0]) / math.log(row["sizes"][1] / row["sizes"][0])
             assert row["exponent"] == pytest.approx(slope)
-    assert (tmp_path / "rows.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "benchmarks.png").read_bytes().startswith(b"\x89PNG")
+    filled = (tmp_path / "benchmarks.md").read_text()
+    for row in rows:
+        assert f"| {row['work']} | {row['shape']} |" in filled
+    # What stands around the tables is as it was.
+    assert filled.startswith(page.split("<!-- table: begin -->")[0])
+    assert filled.endswith(page.split("<!-- growth: end -->")[1])
 
 
 def test_calls_alternate_and_inputs_rotate() -> None:
