@@ -1,0 +1,71 @@
+"""What the learners of the observability study are shown: the teacher's runs, as seen through disturbances."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from jaxtyping import Float64
+from numpy.typing import NDArray
+from torch import Tensor
+
+import sim
+from behaviours import Demonstrations
+from behaviours.remembering import Recent, windows
+from experiments.lessons import shown_in
+from experiments.observability_disturbances import Disturbance, Floats, Integers, mixed
+
+
+@dataclass(frozen=True)
+class Memory:
+    """Which readings a learner sees beside the present ones: those `lags` steps ago; gaps filled if it can `hold`."""
+
+    lags: tuple[int, ...] = ()
+    hold: bool = False
+
+    def recent(self) -> Recent:
+        """The memory of robots that drive."""
+        return Recent(self.lags, self.hold)
+
+    def __str__(self) -> str:
+        steps = "step" if self.lags == (1,) else "steps"
+        past = f"{', '.join(map(str, self.lags))} {steps} ago" if self.lags else "no past"
+        return f"{past}, gaps held" if self.hold else past
+
+
+@dataclass(frozen=True)
+class Lessons:
+    """Recorded runs of the teacher: true readings `[N, n]`, its commands `[N, m]`, and whose they are.
+
+    `counts` `[N]`: before the lamp was reached. A robot at rest repeats one condition and would flatter every learner,
+    so that only these are compared; what it does at the lamp is to be learned all the same.
+    """
+
+    readings: Floats
+    commands: Floats
+    episodes: Integers
+    steps: Integers
+    counts: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, rollout: sim.Rollout) -> Lessons:
+        """All control steps of a recorded rollout."""
+        shown, moving = shown_in(rollout)
+        return cls(
+            shown.sensors.numpy(), shown.commands.numpy(), shown.episodes.numpy(), rollout.trajectory.step, moving
+        )
+
+    def seen(self, disturbances: Sequence[Disturbance], memory: Memory) -> Float64[Tensor, "N w"]:
+        """What a learner with that memory sees of them; the disturbances take turns, one an episode."""
+        disturbed = mixed(disturbances, self.readings, self.episodes, self.steps)
+        return windows(torch.from_numpy(disturbed), torch.from_numpy(self.episodes), memory.lags, memory.hold)
+
+    def demonstrations(self, disturbances: Sequence[Disturbance], memory: Memory) -> Demonstrations:
+        """The samples to learn from: those with at least one reading. Raises `ValueError` if there is none."""
+        seen = self.seen(disturbances, memory)
+        keep = ~seen.isnan().all(-1)
+        if not keep.any():
+            raise ValueError("no sensor was observed in any demonstration; choose weaker disturbances")
+        return Demonstrations(seen, self.commands, self.episodes).where(keep)

@@ -1,0 +1,222 @@
+"""The study of partly observable states: its figures by hand, and the command as a user would run it."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+import torch
+from commands import corral, only, results
+
+import sim
+from behaviours import Demonstrations
+from experiments.observability import check
+from experiments.observability_curves import curves
+from experiments.observability_disturbances import DISTURBANCES, HIGH, LOW, Disturbance
+from experiments.observability_learners import Asked, Learned, Study, Through, best, compare
+from experiments.observability_lessons import Lessons, Memory
+from experiments.observability_report import mean_over, sentences
+
+SMALL = (
+    "demonstrations=8", "validation=4", "heldout=4", "starts=4", "seconds=4", "vsa.dim=300", "encoder.bins=8",
+    "encoder.span=2", "passes=2", "lags=[[1],[1,2]]", "leaves=[5]", "strengths.missing=[0,0.5]",
+    "strengths.aliased=[0,1]", "disturbances=[missing,aliased]", "learners=[teacher,default,trace,hold,tree_memory]",
+)  # fmt: skip
+
+
+def test_an_undisturbed_teacher_drives_as_the_teacher() -> None:
+    def drive(policy: sim.Policy) -> sim.Rollout:
+        return sim.rollout(policy, episodes=range(3), seconds=5, robots=2)
+
+    undisturbed: Disturbance = DISTURBANCES["delayed"](0, 0)
+
+    def of_the_present(seen: Any) -> Any:
+        assert seen.shape[1] == 9  # now, and 1 and 4 steps ago
+        return sim.Teacher()(seen[:, :3])
+
+    own, through = drive(sim.Teacher()), drive(Through(Learned(of_the_present, Memory((1, 4))), undisturbed))
+    np.testing.assert_array_equal(own.trajectory.sensors, through.trajectory.sensors)
+
+
+def lessons(commands: list[list[float]], counts: list[bool] | None = None) -> Lessons:
+    """One episode with these commands of the teacher, at readings in the middle of their ranges."""
+    size = len(commands)
+    readings = np.tile((LOW + HIGH) / 2, (size, 1))
+    counts = [True] * size if counts is None else counts
+    return Lessons(readings, np.array(commands), np.zeros(size, np.int64), np.arange(size), np.array(counts))
+
+
+STRAIGHT, LEFT, RIGHT = [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]
+
+
+def test_agreement_counts_moments_and_balanced_agreement_counts_commands() -> None:
+    # Before the lamp: six times straight, once left, once right. Who always drives straight is right six times of
+    # eight, and for one command of three.
+    shown = lessons([*[STRAIGHT] * 6, LEFT, RIGHT, LEFT], [True] * 8 + [False])
+    learned = Learned(lambda seen: np.tile(STRAIGHT, (len(seen), 1)))
+    found = compare(learned, DISTURBANCES["missing"](0, 0), shown, every=1)
+    assert (found.samples, found.agreement, found.usual_share) == (8, 0.75, 0.75)
+    assert found.balanced_agreement == pytest.approx(1 / 3)
+    assert compare(learned, DISTURBANCES["missing"](0, 0), shown, every=3).samples == 3
+
+
+def test_the_choice_is_thebest_on_validation_runs_and_is_told() -> None:
+    def always(command: list[float]) -> Learned:
+        return Learned(lambda seen: np.tile(command, (len(seen), 1)))
+
+    undisturbed = [DISTURBANCES["missing"](0, 0)]
+    config = {"compare_every": 1}
+    material = Study(config, None, lessons([RIGHT]), lessons([LEFT, LEFT]), undisturbed)  # pyright: ignore[reportArgumentType]
+    chosen = best(material, {"right": lambda: always(RIGHT), "left": lambda: always(LEFT)})
+    assert chosen.tried == {"right": 0.0, "left": 1.0}
+    np.testing.assert_array_equal(chosen.answer(np.zeros((1, 3))), [LEFT])
+
+
+def test_a_robot_that_senses_nothing_does_what_it_was_shown_most_often() -> None:
+    shown = Demonstrations(np.zeros((3, 3)), [LEFT, STRAIGHT, LEFT])
+
+    class Blind:
+        def __call__(self, seen: torch.Tensor) -> Any:
+            commands = torch.full((len(seen), 2), torch.nan, dtype=torch.float64)
+            commands[0] = 1.0
+            return type("Recall", (), {"commands": commands})
+
+    asked = Asked(Blind(), shown)  # pyright: ignore[reportArgumentType]
+    np.testing.assert_array_equal(asked(np.full((2, 3), np.nan)), [STRAIGHT, LEFT])
+
+
+def test_demonstrations_leave_out_moments_without_any_reading() -> None:
+    shown = lessons([STRAIGHT] * 400)
+    lost = DISTURBANCES["missing"](0.7, 0)
+    seen = lost(shown.readings, shown.episodes, shown.steps)
+    found = shown.demonstrations([lost], Memory((1,)))
+    blind = np.isnan(seen).sum(1) == seen.shape[1]
+    # With a memory of one step, what is lost now and before is lost.
+    never = np.logical_and(blind, np.append(True, blind[:-1]))
+    assert never.any()
+    assert len(found) == 400 - np.count_nonzero(never)
+    with pytest.raises(ValueError, match="choose weaker disturbances"):
+        shown.demonstrations([DISTURBANCES["missing"](1, 0)], Memory())
+
+
+def row(learner: str, strength: float, agreement: float, success: float | None) -> dict[str, Any]:
+    return {
+        "learner": learner, "disturbance": "missing", "strength": strength,
+        "balanced_agreement": agreement, "success_rate": success,
+    }  # fmt: skip
+
+
+def test_sentences_follow_from_the_numbers() -> None:
+    table = [
+        row("default", 0.0, 1.0, 1.0), row("default", 0.5, 0.5, None), row("default", 0.8, 0.3, 0.1),
+        row("disturbed", 0.5, 0.7, None), row("disturbed", 0.8, 0.5, 0.1), row("trace", 0.8, 0.5, 0.6),
+    ]  # fmt: skip
+    assert mean_over(table, "missing", "default", "balanced_agreement") == pytest.approx(0.4)
+    assert mean_over(table, "missing", "tree", "success_rate") is None
+    told = sentences(table)["missing"]
+    assert "raised from 0.40 to 0.60 by showing" in told
+    assert "lowered from 0.60 to 0.50 by `trace`" in told
+    assert "Success rate: highest for `trace` (0.60); unchanged (0.10) by showing" in told
+
+
+def test_the_figure_shows_success_only_if_somebody_drove() -> None:
+    def titles(success: float | None) -> list[str]:
+        measured = {
+            "label": "0.5",
+            "agreement": 0.9,
+            "usual_share": 0.8,
+            "success_low": success,
+            "success_high": success,
+        }
+        figure = curves([row(name, 0.5, 0.7, success) | measured for name in ("default", "tree")])
+        return [axes.get_ylabel() for axes in figure.axes]
+
+    assert titles(None) == ["balanced agreement", "agreement"]
+    assert titles(0.5) == ["balanced agreement", "agreement", "success rate"]
+
+
+def test_what_is_not_there_is_named() -> None:
+    config: dict[str, Any] = {
+        "learners": ["default"], "disturbances": ["missing"], "strengths": {"missing": [0, 0.5]}, "demonstrations": 1,
+        "validation": 1, "heldout": 1, "compare_every": 1, "starts": 0, "lags": [[1]], "leaves": [5],
+    }  # fmt: skip
+    check(config)
+    for change, words in (
+        ({"learners": ["nobody"]}, "there is no learner 'nobody'"),
+        ({"disturbances": ["fog"]}, "there is no disturbance 'fog'"),
+        ({"disturbances": ["missing", "missing"]}, "'missing' is named 2 times"),
+        ({"learners": []}, "no learner is named; choose from teacher, "),
+        ({"strengths": {"missing": [0.5]}}, "strengths.missing grow from 0"),
+        ({"strengths": {"missing": [0, 2]}}, "from 0 to 1; got 2"),
+        ({"starts": -1}, "starts=-1: expected 0 or more"),
+        ({"heldout": 0}, "heldout=0: expected 1 or more"),
+        ({"lags": []}, "lags is empty"),
+        ({"lags": [[2, 1]]}, "growing numbers of steps"),
+    ):
+        with pytest.raises(ValueError, match=words):
+            check(config | change)
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A tiny run."""
+    folder = tmp_path_factory.mktemp("observability")
+    run = corral(folder, *SMALL, "workers=1", module="experiments.observability")
+    assert run.returncode == 0, run.stderr
+    assert "balanced" in run.stdout
+    return folder
+
+
+def test_the_command_writes_what_it_promises(finished: Path) -> None:
+    content = results(finished)
+    everywhere = ["teacher", "default", "trace", "tree_memory"]
+    assert [(r["disturbance"], r["learner"], r["strength"]) for r in content["table"]] == [
+        (disturbance, learner, strength)
+        for disturbance, learners, strengths in (
+            ("missing", [*everywhere[:3], "hold", "tree_memory"], (0, 0.5)),
+            ("aliased", everywhere, (0, 1)),
+        )
+        for learner in learners
+        for strength in strengths
+    ]
+    rows = {(r["disturbance"], r["strength"], r["learner"]): r for r in content["table"]}
+    assert rows["missing", 0, "teacher"]["agreement"] == rows["aliased", 0, "teacher"]["agreement"] == 1.0
+    assert rows["missing", 0.5, "teacher"]["agreement"] < 1.0
+    assert rows["missing", 0, "default"]["agreement"] > 0.9
+    assert (rows["missing", 0.5, "hold"]["lags"], rows["missing", 0.5, "hold"]["hold"]) == ([], True)
+    for key, figures in rows.items():
+        place = f"{key[0]}.{key[1]:g}.{key[2]}"
+        assert content["metrics"][f"{place}.success_rate"] == figures["success_rate"]
+        low, high = sim.wilson(round(figures["success_rate"] * 4), 4)
+        assert (figures["success_low"], figures["success_high"]) == (low, high)
+    records = pq.read_table(only(finished, "records.parquet")).to_pylist()
+    assert len(records) == len(rows) * 4
+    assert only(finished, "observability.png").stat().st_size > 10_000
+
+
+def test_the_memory_with_the_highest_validation_figure_is_the_one_of_the_rows(finished: Path) -> None:
+    content = results(finished)
+    key = "aliased.trace.validation."
+    tried = {name.removeprefix(key): value for name, value in content["metrics"].items() if name.startswith(key)}
+    assert list(tried) == ["1 step ago", "1, 2 steps ago"]
+    (chosen,) = {tuple(r["lags"]) for r in content["table"] if (r["disturbance"], r["learner"]) == ("aliased", "trace")}
+    assert str(Memory(chosen)) == max(tried, key=lambda name: tried[name])
+    page = only(finished, "report.html").read_text()
+    assert "data:image/png;base64," in page
+    assert "1, 2 steps ago" in page
+
+
+def test_the_same_seed_gives_the_same_results_in_other_batches(finished: Path, tmp_path: Path) -> None:
+    run = corral(tmp_path, *SMALL, "workers=2", "robots=1", module="experiments.observability")
+    assert run.returncode == 0, run.stderr
+    ours, theirs = results(finished), results(tmp_path)
+    assert ours["table"] == theirs["table"]
+    assert ours["metrics"] == theirs["metrics"]
+
+
+def test_an_error_is_one_line(tmp_path: Path) -> None:
+    run = corral(tmp_path, "learners=[nobody]", module="experiments.observability")
+    assert run.returncode == 1
+    assert run.stderr.startswith("observability: there is no learner 'nobody'; choose from teacher, ")
+    assert run.stderr.count("\n") == 1
