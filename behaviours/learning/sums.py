@@ -145,7 +145,7 @@ class Sums:
     def _add_dissimilar_clipped(self, block: _Block, threshold: float) -> list[int]:
         """The same with the literal clip, under which sums are not linear: the vectors themselves are asked."""
         met, which = distinct_rows(torch.stack([block.condition, block.result], 1))
-        pairs = self._pairs(_Block(block.conditions, met[:, 0], met[:, 1]), slice(None))
+        pairs, pair = self._pairs(_Block(block.conditions, met[:, 0], met[:, 1]), slice(None)), which.tolist()
         lengths = _numbers(norms(block.conditions))[block.condition.numpy()]
         added, start, ahead = [], 0, _AHEAD
         while start < len(block):
@@ -158,7 +158,7 @@ class Sums:
             if not new[at]:
                 start, ahead = start + len(new), 2 * ahead
                 continue
-            self._add_clipped(pairs[which[start + at]])
+            self._add_clipped(pairs[pair[start + at]])
             added.append(start + at)
             start, ahead = start + at + 1, _AHEAD
         return added
