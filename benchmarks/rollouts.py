@@ -19,7 +19,7 @@ Floats = NDArray[np.float64]
 
 def cases(device: str, small: bool = False) -> Iterator[Case]:
     """64 robots on both bodies. One process asks for all robots at once; the peer has one process per robot."""
-    robots, ticks, dim = (2, 3, 256) if small else (64, 100, 4000)
+    robots, ticks, dim = (2, 3, 256) if small else (64, 40, 4000)
     shown = corral.samples(300 if small else 20_000)
     mind = ErrorDriven(margin=5.0).fit(corral.space(dim, "cpu"), shown)
 
