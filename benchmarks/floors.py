@@ -32,6 +32,6 @@ def product(dtype: torch.dtype, multiplications: int, device: str) -> Floor:
     """That many multiplications and additions, at the rate of a large square product in the same type."""
     if dtype == torch.int8:
         a, b = (torch.ones(_SIDE, _SIDE, dtype=dtype, device=device) for _ in range(2))
-        return Floor("int8 product", lambda _: torch._int_mm(a, b.T), multiplications / _SIDE**3)
+        return Floor("int8 product", lambda _: torch.ops.aten._int_mm(a, b.T), multiplications / _SIDE**3)
     a, b = (torch.ones(_SIDE, _SIDE, dtype=dtype, device=device) for _ in range(2))
     return Floor(f"{str(dtype).removeprefix('torch.')} product", lambda _: a @ b.T, multiplications / _SIDE**3)

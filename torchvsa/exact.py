@@ -43,8 +43,8 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         # The int8 units of the CPU, summing in int32 (they answer nonsense where d = 1).
         rows = a.reshape(-1, a.shape[-1])
         if len(b) < _FEW < len(rows):
-            return torch._int_mm(b, rows.T).T.reshape(*a.shape[:-1], len(b))
-        return torch._int_mm(rows, b.T).reshape(*a.shape[:-1], len(b))
+            return torch.ops.aten._int_mm(b, rows.T).T.reshape(*a.shape[:-1], len(b))
+        return torch.ops.aten._int_mm(rows, b.T).reshape(*a.shape[:-1], len(b))
     if is_integer(a) or is_integer(b):
         # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
         wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)

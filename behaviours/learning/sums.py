@@ -80,15 +80,15 @@ class Sums:
 
         An empty memory resembles nothing, even where the threshold is negative.
         """
-        accepted = [torch.zeros(0, dtype=torch.bool)]
         add = self._add_dissimilar_clipped if self.clip else self._add_dissimilar
-        for block in self._blocks(torch.arange(len(self.samples.condition))):
-            new = torch.zeros(len(block), dtype=torch.bool)
-            new[add(block, threshold)] = True
-            accepted.append(new)
-        everywhere = torch.cat(accepted)
-        self.rows += everywhere.nonzero()[:, 0].tolist()
-        return everywhere
+        start = 0
+        with torch.inference_mode():  # thousands of small steps, of which none needs to know its history
+            for block in self._blocks(torch.arange(len(self.samples.condition))):
+                self.rows += [start + row for row in add(block, threshold)]
+                start += len(block)
+        accepted = torch.zeros(len(self.samples.condition), dtype=torch.bool)
+        accepted[self.rows] = True
+        return accepted
 
     def _blocks(self, rows: Int64[Tensor, "N"]) -> Iterator[_Block]:
         start = 0
@@ -153,7 +153,7 @@ class Sums:
             asked = block.conditions.index_select(0, block.condition[start : start + ahead])
             products = _numbers(dots(torch.cat([asked, known]), known))[:, 0]
             length = products[-1] ** 0.5
-            new = ~_above(threshold, products[:-1], length * lengths[start : start + ahead]) | self.empty
+            new = self.empty | ~_above(threshold, products[:-1], length * lengths[start : start + ahead])
             at = int(new.argmax())
             if not new[at]:
                 start, ahead = start + len(new), 2 * ahead
