@@ -14,7 +14,6 @@ from behaviours.space import Space
 from torchvsa import ShapeError
 from torchvsa.blocks import by_blocks
 from torchvsa.exact import is_integer, norms, signed
-from torchvsa.memory import best
 
 
 class Behaviour(nn.Module):
@@ -69,10 +68,7 @@ class Behaviour(nn.Module):
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """Answer conditions that are encoded and protected already (Algorithm 2, lines 2 to 8)."""
-        answers = self._folded()(conditions)
-        match = best(answers.scores, answers.lengths)
-        commands = self.memory.commands[match.index]
-        return Recall(commands, match.similarity, match.margin, answers.familiarity.to(torch.float32))
+        return self._folded().recall(conditions, self.memory.commands)
 
     def _folded(self) -> Folded:
         """The folded program: as long as no tensor that it is made of changes, the same one."""

@@ -6,8 +6,10 @@ import torch
 from jaxtyping import Float64, Int8, Int64, Shaped
 from torch import Tensor, nn
 
+from behaviours.recall import Recall
 from torchvsa import VSA
 from torchvsa.exact import dots, is_integer, norms, scaled, signed
+from torchvsa.memory import best
 
 
 class Answers(NamedTuple):
@@ -80,6 +82,13 @@ class Folded(nn.Module):
         squares = _joined(dots(codes * codes, self.square), self.square_weights).sqrt()
         familiarity = scaled(products[:, -1], squares[:, 1] * self.known_length)
         return Answers(scaled(products[:, :-1], self.item_lengths), squares[:, 0], familiarity)
+
+    def recall(self, conditions: Shaped[Tensor, "batch d"], commands: Float64[Tensor, "k m"]) -> Recall:
+        """Answer conditions with the best item's row of `commands`."""
+        answers = self(conditions)
+        match = best(answers.scores, answers.lengths)
+        familiarity = answers.familiarity.to(torch.float32)
+        return Recall(commands[match.index], match.similarity, match.margin, familiarity)
 
 
 def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], Float64[Tensor, "digits"]]:

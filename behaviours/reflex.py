@@ -2,12 +2,10 @@
 
 from typing import TYPE_CHECKING, Any
 
-import torch
 from torch import Tensor, nn
 
 from behaviours.folding import Folded
 from behaviours.recall import Recall
-from torchvsa.memory import best
 
 if TYPE_CHECKING:
     from behaviours.behaviour import Behaviour
@@ -33,8 +31,5 @@ class Reflex(nn.Module):
     def forward(self, readings: Any) -> Recall:
         """Commands, similarity, margin and familiarity; see `Behaviour.forward`."""
         bins = self.space.bins(readings)
-        answers = self.folded(self.space.encode(bins))
-        match = best(answers.scores, answers.lengths)
-        familiarity = answers.familiarity.to(torch.float32)
-        recall = Recall(self.commands[match.index], match.similarity, match.margin, familiarity)
+        recall = self.folded.recall(self.space.encode(bins), self.commands)
         return recall.blank((bins < 0).all(-1))

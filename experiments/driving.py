@@ -1,6 +1,6 @@
 """Driving robots for a study: on all workers, with progress shown."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
@@ -39,6 +39,34 @@ class Driver:
             record=record,
             progress=lambda count: self.progress.advance(task, count),
         )
+
+
+def drive_here(
+    config: Mapping[str, Any],
+    policy: sim.Policy,
+    episodes: Iterable[int],
+    arena: str | sim.Arena = "default",
+    record: bool = False,
+) -> sim.Rollout:
+    """Drive in this process, with the settings of the run: for jobs that are spread over the workers themselves."""
+    return sim.rollout(
+        policy,
+        arena=arena,
+        body=config["body"]["name"],
+        episodes=episodes,
+        seed=config["seed"],
+        seconds=config["seconds"],
+        robots=config["robots"],
+        record=record,
+    )
+
+
+def pooled_success(episodes: int, successes: int) -> dict[str, Any]:
+    """Success over all episodes, with Wilson's 95 % interval, as columns of a row; None for no episode."""
+    if not episodes:
+        return dict.fromkeys(("episodes", "success_rate", "success_low", "success_high"))
+    low, high = sim.wilson(successes, episodes)
+    return {"episodes": episodes, "success_rate": successes / episodes, "success_low": low, "success_high": high}
 
 
 @contextmanager

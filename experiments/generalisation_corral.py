@@ -25,6 +25,7 @@ from behaviours.ordered import distinct_rows
 from experiments import presets
 from experiments.agreement import right
 from experiments.controllers import Classified, Recalled
+from experiments.driving import drive_here, pooled_success
 from experiments.jobs import run_jobs
 from experiments.lessons import FIRST_DEMONSTRATION, shown_in
 from experiments.results import Row
@@ -163,22 +164,7 @@ def run(config: Mapping[str, Any], executor: Executor, progress: Progress) -> li
 
 
 def _teacher(config: Mapping[str, Any], arena: str, episodes: Sequence[int]) -> sim.Rollout:
-    return _drive(config, arena, sim.Teacher(), episodes, record=True)
-
-
-def _drive(
-    config: Mapping[str, Any], arena: str, policy: sim.Policy, episodes: Sequence[int], record: bool = False
-) -> sim.Rollout:
-    return sim.rollout(
-        policy,
-        arena=arena,
-        body=config["body"]["name"],
-        episodes=episodes,
-        seed=config["seed"],
-        seconds=config["seconds"],
-        robots=config["robots"],
-        record=record,
-    )
+    return drive_here(config, sim.Teacher(), episodes, arena, record=True)
 
 
 def _space(config: Mapping[str, Any], vsa: Mapping[str, Any], one: Combination, seed: int) -> Space:
@@ -216,7 +202,7 @@ def learn_and_ask(
         # The default drives everywhere; with one part changed, in unseen arenas after the most demonstrations only.
         if len(changed) <= 1 and (arena == HOME or not changed or count == max(own["demonstrations"])):
             starts = own["variant_starts"] if changed else own["starts"]
-            rollout = _drive(config, arena, policy, range(draw, starts, draws))
+            rollout = drive_here(config, policy, range(draw, starts, draws), arena)
             row |= {"episodes": len(rollout), "successes": int(rollout.success.sum())}
         rows.append(row)
     return rows
@@ -274,15 +260,6 @@ def table(records: Sequence[Row]) -> list[Row]:
             if values:
                 row |= {figure: float(np.median(values)), f"{figure}_min": min(values), f"{figure}_max": max(values)}
         driven = [record for record in own if record["episodes"]]
-        row |= dict.fromkeys(("episodes", "success_rate", "success_low", "success_high"))
-        if driven:
-            episodes, successes = (sum(record[key] for record in driven) for key in ("episodes", "successes"))
-            low, high = sim.wilson(successes, episodes)
-            row |= {
-                "episodes": episodes,
-                "success_rate": successes / episodes,
-                "success_low": low,
-                "success_high": high,
-            }
+        row |= pooled_success(*(sum(record[key] for record in driven) for key in ("episodes", "successes")))
         rows.append(row)
     return rows

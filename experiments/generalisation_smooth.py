@@ -26,6 +26,7 @@ from sklearn.preprocessing import StandardScaler
 import sim
 from behaviours import BehaviourClassifier, BehaviourRegressor
 from behaviours.data import load_wall_following
+from experiments.driving import drive_here, pooled_success
 from experiments.generalisation_wall_following import FOLDS, blocks
 from experiments.jobs import run_jobs
 from experiments.lessons import FIRST_DEMONSTRATION, shown_in
@@ -161,19 +162,7 @@ def _variants(config: Mapping[str, Any]) -> list[tuple[str, int | None, int | No
 
 
 def _teacher(config: Mapping[str, Any], episodes: Sequence[int]) -> sim.Rollout:
-    return _drive(config, corral_commands, episodes, record=True)
-
-
-def _drive(config: Mapping[str, Any], policy: sim.Policy, episodes: Sequence[int], record: bool = False) -> sim.Rollout:
-    return sim.rollout(
-        policy,
-        body=config["body"]["name"],
-        episodes=episodes,
-        seed=config["seed"],
-        seconds=config["seconds"],
-        robots=config["robots"],
-        record=record,
-    )
+    return drive_here(config, corral_commands, episodes, record=True)
 
 
 def _samples(rollout: sim.Rollout) -> tuple[Floats, Floats]:
@@ -227,7 +216,7 @@ def fit_and_ask(
         "successes": None,
     }
     if task == "corral" and (dim is None or dim == max(config["smooth"]["dims"])):
-        rollout = _drive(config, Regressed(made), range(config["smooth"]["starts"]))
+        rollout = drive_here(config, Regressed(made), range(config["smooth"]["starts"]))
         row |= {"episodes": len(rollout), "successes": int(rollout.success.sum())}
     return row
 
@@ -247,16 +236,7 @@ def table(records: Sequence[Row]) -> list[Row]:
         for figure in ("rmse", "mean_rmse", "relative", "rounding_rmse"):
             values = [record[figure] for record in own if record[figure] is not None]
             row[figure] = float(np.mean(values)) if values else None
-        row |= dict.fromkeys(("episodes", "success_rate", "success_low", "success_high"))
-        if own[0]["episodes"]:
-            episodes, successes = own[0]["episodes"], own[0]["successes"]
-            low, high = sim.wilson(successes, episodes)
-            row |= {
-                "episodes": episodes,
-                "success_rate": successes / episodes,
-                "success_low": low,
-                "success_high": high,
-            }
+        row |= pooled_success(own[0]["episodes"] or 0, own[0]["successes"] or 0)
         rows.append(row)
     order = {task: place for place, task in enumerate(TASKS)}
     models = {model: place for place, model in enumerate(("teacher", *MODELS))}

@@ -25,11 +25,11 @@ import sim
 from behaviours.remembering import check_lags
 from experiments import presets
 from experiments.command_line import errors_in_one_line, job
-from experiments.driving import Driver, progress_bars, workers
+from experiments.driving import Driver, drive_here, progress_bars, workers
 from experiments.jobs import run_jobs
 from experiments.lessons import FIRST_DEMONSTRATION, FIRST_VALIDATION
 from experiments.observability_disturbances import DISTURBANCES, Disturbance
-from experiments.observability_learners import LEARNERS, Learned, Study, Through, compare
+from experiments.observability_learners import LEARNERS, Study, Through, compare
 from experiments.observability_lessons import Lessons
 from experiments.results import Results, Row
 
@@ -97,29 +97,20 @@ def examine(learner: str, material: Study, heldout: Lessons) -> Examined:
     config = material.config
     learned = LEARNERS[learner].learn(material)
     rows, episodes = [], []
+    arena = presets.arena(config["arena"])
     for disturbance in material.disturbances:
         strength = disturbance.strength
         which = {"learner": learner, "disturbance": disturbance.name, "strength": float(strength)}
         asked = compare(learned, disturbance, heldout, config["compare_every"])
-        rollout = _drive(learned, disturbance, config) if config["starts"] else None
+        rollout = (
+            drive_here(config, Through(learned, disturbance), range(config["starts"]), arena)
+            if config["starts"]
+            else None
+        )
         memory = {"lags": list(learned.memory.lags), "hold": learned.memory.hold}
         rows.append({**which, "label": disturbance.label(strength), **memory, **asdict(asked), **_driven(rollout)})
         episodes += [] if rollout is None else [{**which, **row} for row in _episodes(rollout)]
     return Examined(f"{material.disturbances[0].name}.{learner}", rows, episodes, learned.tried)
-
-
-def _drive(learned: Learned, disturbance: Disturbance, config: Mapping[str, Any]) -> sim.Rollout:
-    """Drive from the held-out starts, in this process."""
-    return sim.rollout(
-        Through(learned, disturbance),
-        arena=presets.arena(config["arena"]),
-        body=config["body"]["name"],
-        episodes=range(config["starts"]),
-        seed=config["seed"],
-        seconds=config["seconds"],
-        robots=config["robots"],
-        record=False,
-    )
 
 
 def _driven(rollout: sim.Rollout | None) -> Row:

@@ -12,7 +12,6 @@ from behaviours.learning.conditions import Conditions
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.progress import Progress, silent
 from behaviours.recall import scores
-from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa.exact import is_integer, norms, signed
@@ -72,11 +71,8 @@ class ErrorDriven(Rule):
         trained = self._train(space.vsa, samples.conditions, targets, items, before, progress)
         program, passes, updates, wrong = trained
         progress(1.0)
-        report = LearningReport(
+        report = samples.report(
             self.name,
-            samples=len(samples.condition),
-            new=len(samples.conditions),
-            truly_known=len(samples.condition) - len(samples.conditions),
             contradicting=int((targets[samples.condition] != samples.result).sum()),
             passes=passes,
             updates=updates,

@@ -14,7 +14,6 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule, grown
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.progress import Progress, silent
-from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa.exact import dots, norms, signed
@@ -112,11 +111,8 @@ class Gradient(Rule):
         training = _Training(self, space.vsa, samples, items, before)
         program, passes, updates = training.run(train, held, generator, progress)
         progress(1.0)
-        report = LearningReport(
+        report = samples.report(
             self.name,
-            samples=len(samples.condition),
-            new=len(samples.conditions),
-            truly_known=len(samples.condition) - len(samples.conditions),
             contradicting=int((aims[shown.condition] != shown.result).sum()),
             passes=passes,
             updates=updates,

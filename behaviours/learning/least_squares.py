@@ -13,7 +13,6 @@ from behaviours.learning.base import Rule
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.progress import Progress, silent
 from behaviours.recall import scores
-from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa.exact import is_integer, norms, signed
@@ -61,11 +60,8 @@ class LeastSquares(Rule):
         conditions = samples.conditions[:]
         program = solve(space.vsa, conditions, items, targets, self.ridge)
         said = scores(space.vsa, program, conditions, items, norms(items)).argmax(1)
-        report = LearningReport(
+        report = samples.report(
             self.name,
-            samples=len(samples.condition),
-            new=len(samples.conditions),
-            truly_known=len(samples.condition) - len(samples.conditions),
             contradicting=int((counts.argmax(1)[shown.condition] != shown.result).sum()),
             wrong=int((said != counts.argmax(1)).sum()),
         )

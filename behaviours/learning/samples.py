@@ -11,6 +11,7 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning.conditions import Conditions, encode_distinct
 from behaviours.ordered import distinct_rows
 from behaviours.progress import Progress, silent
+from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA
 
@@ -76,6 +77,11 @@ class Samples:
     def settled(self, contradictions: Contradictions) -> "Samples":
         """The same samples, each with the result that its condition shall have."""
         return replace(self, result=self.targets(contradictions)[self.condition])
+
+    def report(self, rule: str, **counts: int) -> LearningReport:
+        """The report of a rule that trains on all conditions, with its further `counts`."""
+        samples, distinct = len(self.condition), len(self.conditions)
+        return LearningReport(rule, samples=samples, new=distinct, truly_known=samples - distinct, **counts)
 
     def known(self, vsa: VSA) -> Shaped[Tensor, "d"]:
         """The sum of the distinct conditions, as a raw accumulator."""
