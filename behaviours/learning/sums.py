@@ -13,12 +13,10 @@ from behaviours.learning.samples import Samples
 from behaviours.ordered import distinct_rows
 from behaviours.progress import Progress, silent
 from behaviours.space import Space
-from torchvsa.exact import dots, norms, signed
+from torchvsa.exact import dots, is_integer, norms, signed
 
 _DISTINCT, _BLOCK = 512, 8192
 """Most distinct conditions that are held, and compared with each other, at once; and most samples of them."""
-_AHEAD = 8
-"""Samples asked at once after an addition that is clipped; twice as many whenever all of them are known."""
 
 
 @dataclass(frozen=True)
@@ -42,7 +40,8 @@ class Sums:
     def __init__(self, space: Space, samples: Samples, clip: bool, progress: Progress = silent) -> None:
         self.vsa, self.samples, self.clip = space.vsa, samples, clip
         self.items = space.results(samples.results)
-        self.state = torch.zeros(2, self.vsa.dim, dtype=self.vsa.accumulator, device=self.items.device)
+        nothing = torch.zeros(2, self.vsa.dim, dtype=self.vsa.accumulator, device=self.items.device)
+        self.state = torch.zeros_like(self.vsa.normalize(nothing)) if clip else nothing
         self.progress = progress
         self.rows: list[int] = []
         self.empty = True
@@ -145,23 +144,28 @@ class Sums:
     def _add_dissimilar_clipped(self, block: _Block, threshold: float) -> list[int]:
         """The same with the literal clip, under which sums are not linear: the vectors themselves are asked."""
         met, which = distinct_rows(torch.stack([block.condition, block.result], 1))
-        pairs, pair = self._pairs(_Block(block.conditions, met[:, 0], met[:, 1]), slice(None)), which.tolist()
-        lengths = _numbers(norms(block.conditions))[block.condition.numpy()]
-        added, start, ahead = [], 0, _AHEAD
-        while start < len(block):
-            known = self.state[1:]
-            asked = block.conditions.index_select(0, block.condition[start : start + ahead])
-            products = _numbers(dots(torch.cat([asked, known]), known))[:, 0]
-            length = products[-1] ** 0.5
-            new = self.empty | ~_above(threshold, products[:-1], length * lengths[start : start + ahead])
-            at = int(new.argmax())
-            if not new[at]:
-                start, ahead = start + len(new), 2 * ahead
-                continue
-            self._add_clipped(pairs[pair[start + at]])
-            added.append(start + at)
-            start, ahead = start + at + 1, _AHEAD
+        pairs = self._pairs(_Block(block.conditions, met[:, 0], met[:, 1]), slice(None)).unbind()
+        lengths = norms(block.conditions).tolist()
+        wide = torch.promote_types(_floats(block.conditions).dtype, _floats(self.state).dtype)
+        conditions = _floats(block.conditions).to(wide).unbind()
+        known, length = self._known(wide)
+        resembles: dict[int, bool] = {}  # by condition, until the next addition
+        added = []
+        for row, (condition, pair) in enumerate(zip(block.condition.tolist(), which.tolist(), strict=True)):
+            if condition not in resembles:
+                product, scale = conditions[condition].dot(known).item(), length * lengths[condition]
+                resembles[condition] = not self.empty and (product / scale if scale else 0.0) > threshold
+            if not resembles[condition]:
+                self._add_clipped(pairs[pair])
+                known, length = self._known(wide)
+                resembles.clear()
+                added.append(row)
         return added
+
+    def _known(self, wide: torch.dtype) -> tuple[Shaped[Tensor, "d"], float]:
+        """The known conditions as `_floats` of a type, and their length."""
+        known = _floats(self.state[1]).to(wide)
+        return known, known.dot(known).item() ** 0.5
 
 
 def _above(threshold: float, products: NDArray[np.float64], lengths: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -173,3 +177,14 @@ def _above(threshold: float, products: NDArray[np.float64], lengths: NDArray[np.
 
 def _numbers(x: Tensor) -> NDArray[np.float64]:
     return x.to(torch.float64).cpu().numpy()
+
+
+def _floats(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
+    """Real vectors with the same products, in the smallest type that keeps those of integers exact."""
+    x = signed(x)
+    if x.is_complex():
+        return torch.view_as_real(x).flatten(-2)
+    if is_integer(x):
+        # Codes of one byte are -1, 0 or +1: sums of 2^24 products are exact in float32.
+        return x.to(torch.float32 if x.dtype == torch.int8 else torch.float64)
+    return x
