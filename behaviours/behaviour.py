@@ -8,7 +8,7 @@ from torch import Tensor, nn
 
 from behaviours.folding import Folded
 from behaviours.memory import ResultMemory
-from behaviours.recall import Recall, scores
+from behaviours.recall import Recall, asked_once, scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import ShapeError
@@ -62,13 +62,20 @@ class Behaviour(nn.Module):
         `torch.export`) takes readings as a tensor and cannot raise: there, those out of range are clipped.
         """
         bins = self.space.bins(readings)
-        # Some rows at a time go all the way, so that their conditions never leave the cache.
-        recall = by_blocks(lambda rows: self.ask(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes * 2)
-        return recall.blank((bins < 0).all(-1))
+        return asked_once(self._answer, bins).blank((bins < 0).all(-1))
+
+    def _answer(self, bins: Int64[Tensor, "batch n"]) -> Recall:
+        folded = self._folded()
+        # Some rows at a time go all the way to a few products, so that their conditions never leave the cache.
+        products = by_blocks(
+            lambda rows: folded.products(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes * 2
+        )
+        return folded.recall(products, self.memory.commands)
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """Answer conditions that are encoded and protected already (Algorithm 2, lines 2 to 8)."""
-        return self._folded().recall(conditions, self.memory.commands)
+        folded = self._folded()
+        return folded.recall(folded.products(conditions), self.memory.commands)
 
     def _folded(self) -> Folded:
         """The folded program: as long as no tensor that it is made of changes, the same one."""

@@ -12,6 +12,19 @@ from torchvsa.exact import dots, is_integer, norms, scaled, signed
 from torchvsa.memory import best
 
 
+class Products(NamedTuple):
+    """What a folded program is asked of each condition; all that follows is a matter of a few numbers."""
+
+    items: Shaped[Tensor, "batch k"]
+    """`<unbind(program, c), item>`."""
+    known: Shaped[Tensor, "batch"]
+    """`<c, known>`."""
+    noise: Float64[Tensor, "batch"]
+    """The lengths of the noisy results, `|unbind(program, c)|`."""
+    lengths: Float64[Tensor, "batch"]
+    """The lengths of the conditions."""
+
+
 class Answers(NamedTuple):
     """What a program says to a batch of conditions."""
 
@@ -63,29 +76,33 @@ class Folded(nn.Module):
         if self.digital:
             votes = torch.cat([signed(tables["rows"]), signed(known)[None]])
             tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64))
-            square = signed(program).to(torch.int64) ** 2
-            tables["square"], tables["square_weights"] = _digits(torch.stack([square, torch.ones_like(square)]))
+            square, tables["square_weights"] = _digits(signed(program).to(torch.int64)[None] ** 2)
+            tables["square"] = torch.cat([square, torch.ones_like(square[:1])])
         for name, table in tables.items():
             self.register_buffer(name, table, persistent=False)
 
-    def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Answers:
-        """Ask for encoded and protected conditions."""
+    def products(self, conditions: Shaped[Tensor, "batch d"]) -> Products:
+        """The products with encoded and protected conditions: the only part that sees their d elements."""
         codes = signed(conditions)
         digital = self.digital and codes.dtype == torch.int8 and codes.device.type == "cpu"
         if not digital or torch.compiler.is_exporting():
-            scores = scaled(dots(conditions, self.rows), self.item_lengths)
-            resemblance, length = dots(conditions, self.known[None])[:, 0], norms(conditions)
+            known = dots(conditions, self.known[None])[:, 0]
             noise = self.vsa.unbound_norm(self.program, conditions)
-            return Answers(scores, noise, scaled(resemblance, length * self.known_length))
+            return Products(dots(conditions, self.rows), known, noise, norms(conditions))
         products = _joined(dots(codes, self.linear), self.linear_weights)
-        # Codes of one byte are -1, 0 or +1 in every architecture, and so are their squares.
-        squares = _joined(dots(codes * codes, self.square), self.square_weights).sqrt()
-        familiarity = scaled(products[:, -1], squares[:, 1] * self.known_length)
-        return Answers(scaled(products[:, :-1], self.item_lengths), squares[:, 0], familiarity)
+        # Codes of one byte are -1, 0 or +1 in every architecture, so that their squares are their absolute values.
+        squares = dots(codes.abs(), self.square)
+        noise = _joined(squares[:, :-1], self.square_weights)[:, 0].sqrt()
+        return Products(products[:, :-1], products[:, -1], noise, squares[:, -1].to(torch.float64).sqrt())
 
-    def recall(self, conditions: Shaped[Tensor, "batch d"], commands: Float64[Tensor, "k m"]) -> Recall:
-        """Answer conditions with the best item's row of `commands`."""
-        answers = self(conditions)
+    def answers(self, products: Products) -> Answers:
+        """What follows from the products."""
+        familiarity = scaled(products.known, products.lengths * self.known_length)
+        return Answers(scaled(products.items, self.item_lengths), products.noise, familiarity)
+
+    def recall(self, products: Products, commands: Float64[Tensor, "k m"]) -> Recall:
+        """Answer with the best item's row of `commands`."""
+        answers = self.answers(products)
         match = best(answers.scores, answers.lengths)
         familiarity = answers.familiarity.to(torch.float32)
         return Recall(commands[match.index], match.similarity, match.margin, familiarity)
@@ -104,4 +121,4 @@ def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], 
 def _joined(products: Shaped[Tensor, "batch rows_digits"], weights: Float64[Tensor, "digits"]) -> Tensor:
     """Products with digits as products with the numbers, exact below 2^53."""
     wide = products.to(torch.float64)
-    return wide if len(weights) == 1 else wide.view(len(wide), -1, len(weights)) @ weights
+    return wide if len(weights) == 1 else (wide.unflatten(1, (-1, len(weights))) * weights).sum(-1)

@@ -1,11 +1,13 @@
 """What a behaviour answers, and the linear algebra by which it finds the answer."""
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import torch
 from jaxtyping import Float, Float64, Int64, Shaped
 from torch import Tensor
 
+from behaviours.ordered import distinct_rows
 from torchvsa import VSA
 from torchvsa.exact import divide, dots
 
@@ -24,6 +26,11 @@ class Recall(NamedTuple):
     speaker: Int64[Tensor, "batch"] | None = None
     """Which behaviour answered: its position in the policy's list of names (policies only)."""
 
+    def rows(self, which: Int64[Tensor, "some"]) -> "Recall":
+        """The answers of these rows, in this order."""
+        spoken = None if self.speaker is None else self.speaker[which]
+        return Recall(self.commands[which], self.similarity[which], self.margin[which], self.familiarity[which], spoken)
+
     def blank(self, rows: Any) -> "Recall":
         """Answer nothing in the given rows: NaN commands; similarity, margin and familiarity 0; speaker -1."""
         return Recall(
@@ -33,6 +40,23 @@ class Recall(NamedTuple):
             self.familiarity.masked_fill(rows, 0.0),
             None if self.speaker is None else self.speaker.masked_fill(rows, -1),
         )
+
+
+_MANY = 128
+"""Rows from which on it pays to find equal ones."""
+
+
+def asked_once(answer: Callable[[Int64[Tensor, "some n"]], Recall], bins: Int64[Tensor, "batch n"]) -> Recall:
+    """`answer(bins)`, asking once about rows that are equal: what a robot reads in a while falls into few bins.
+
+    A graph and a GPU ask about every row, since how many differ is known only from the values.
+    """
+    if torch.compiler.is_compiling() or bins.device.type != "cpu" or len(bins) < _MANY:
+        return answer(bins)
+    distinct, which = distinct_rows(bins)
+    if len(distinct) == len(bins):
+        return answer(bins)
+    return answer(distinct).rows(which)
 
 
 def scores(

@@ -31,5 +31,5 @@ class Reflex(nn.Module):
     def forward(self, readings: Any) -> Recall:
         """Commands, similarity, margin and familiarity; see `Behaviour.forward`."""
         bins = self.space.bins(readings)
-        recall = self.folded.recall(self.space.encode(bins), self.commands)
+        recall = self.folded.recall(self.folded.products(self.space.encode(bins)), self.commands)
         return recall.blank((bins < 0).all(-1))

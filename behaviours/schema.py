@@ -98,14 +98,14 @@ class Schema:
         Sensors with `edges` have their bins between them instead.
         Raises an error that names sensor, row and range for infinite readings and those out of range.
         """
-        rows = self.check_readings(readings)
-        low, high = self._bounds(self.sensors, rows.device)
+        rows, low, high = self._checked(readings)
         unseen = rows.isnan()
         index = ((rows - low) * bins / (high - low)).floor().clamp(0, bins - 1)
-        index = torch.where(unseen, 0.0, index).to(torch.int64)
-        if any(sensor.edges is not None for sensor in self.sensors):
-            columns = zip(self.sensors, rows.unbind(1), index.unbind(1), strict=True)
-            index = torch.stack([self._between_edges(s, bins, row, even) for s, row, even in columns], 1)
+        index = torch.where(unseen, -1.0, index).to(torch.int64)
+        if all(sensor.edges is None for sensor in self.sensors):
+            return index
+        columns = zip(self.sensors, rows.unbind(1), index.unbind(1), strict=True)
+        index = torch.stack([self._between_edges(s, bins, row, even) for s, row, even in columns], 1)
         return torch.where(unseen, -1, index)
 
     @staticmethod
@@ -129,10 +129,20 @@ class Schema:
 
         In a compiled or exported graph no value can raise: there all readings, infinite ones too, are clipped.
         """
+        return self._checked(readings)[0]
+
+    def _checked(self, readings: Any) -> tuple[Tensor, Tensor, Tensor]:
+        """See `check_readings`; the least and the greatest value of each sensor too."""
         rows = _rows(readings, len(self.sensors), "sensor readings", [s.name for s in self.sensors])
         low, high = self._bounds(self.sensors, rows.device)
-        if torch.compiler.is_compiling():
-            return torch.minimum(torch.maximum(rows, low), high)
+        if not torch.compiler.is_compiling():
+            if ((rows >= low) & (rows <= high)).all():
+                return rows, low, high
+            self._refuse(rows, low, high)
+        return torch.minimum(torch.maximum(rows, low), high), low, high
+
+    def _refuse(self, rows: Tensor, low: Tensor, high: Tensor) -> None:
+        """Raise if a reading is infinite, or beyond what its sensor accepts."""
         outside = (rows < low) | (rows > high)  # False for NaN
         strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
         wrong = rows.isinf() | (outside & strict)
@@ -145,7 +155,6 @@ class Schema:
                 f"{' ' + sensor.unit if sensor.unit else ''}"
                 + ("" if np.isinf(value) else " (declare it with beyond='clip' to accept the nearest bound)")
             )
-        return torch.minimum(torch.maximum(rows, low), high)
 
     def command_levels(self, commands: Any) -> Int64[Tensor, "batch m"]:
         """The nearest level of each command (halves up). Raises, naming actuator and row, if one is not in range."""
@@ -170,9 +179,8 @@ class Schema:
 
     @staticmethod
     def _bounds(parts: Sequence[Sensor] | Sequence[Actuator], device: torch.device) -> tuple[Tensor, Tensor]:
-        low = torch.tensor([part.low for part in parts], dtype=torch.float64, device=device)
-        high = torch.tensor([part.high for part in parts], dtype=torch.float64, device=device)
-        return low, high
+        ranges = torch.tensor([(part.low, part.high) for part in parts], dtype=torch.float64, device=device)
+        return ranges[:, 0], ranges[:, 1]
 
 
 def quantile_edges(readings: Any, bins: int) -> Float64[Tensor, "edges"]:

@@ -3,6 +3,7 @@
 from functools import cache
 
 import torch
+from torch import Tensor
 
 import sim
 from behaviours import Demonstrations, Encoder, Space
@@ -24,3 +25,12 @@ def space(dim: int, device: str) -> Space:
     """The paper's: 32 lookup codes, bundled, behind the self-derived shift with the mean width."""
     vsa = MAP(dim, dtype=torch.int8)
     return Space(presets.schema(), vsa, Encoder(32), {"name": "self_shift", "width": "mean"}).to(device)
+
+
+def different(space: Space, rows: int, generator: torch.Generator) -> Tensor:
+    """Readings in the middle of bins, no two rows in the same."""
+    sensors, bins = space.schema.sensors, space.encoder.bins
+    cells = torch.randperm(bins ** len(sensors), generator=generator)[:rows]
+    low, high = (torch.tensor([getattr(s, end) for s in sensors], dtype=torch.float64) for end in ("low", "high"))
+    chosen = cells[:, None] // bins ** torch.arange(len(sensors)) % bins
+    return low + (chosen + 0.5) / bins * (high - low)

@@ -22,25 +22,29 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
         encode = Record(vsa, sensors, levels, values="level", generator=generator).to(device)
         rows = [torch.randint(levels, (batch, sensors), generator=generator).to(device) for _ in range(INPUTS)]
         peer = Peer(encode)
-
-        def check(encode=encode, rows=rows, peer=peer) -> None:
-            for call in (peer.default, peer.tuned):
-                assert torch.equal(encode(rows[0]).float(), plain(call(rows[0])).clamp(-1, 1))
-
         # 3 sensors are bound by writing the result, 24 by reading the entries of the table.
         result = encode(rows[0])
         floor = floors.fill(result) if sensors == 3 else floors.read(sensors * result.numel(), device)
-        yield Case(
-            "record encoding",
-            f"B={batch} n={sensors} V={levels} d={dim}",
-            lambda index, encode=encode, rows=rows: encode(rows[index]),
-            {
-                "torchhd.hash_table": lambda index, peer=peer, rows=rows: peer.default(rows[index]),
-                "torchhd.multiset, table bound by hand": lambda index, peer=peer, rows=rows: peer.tuned(rows[index]),
-            },
-            check,
-            floor,
-        )
+        compiled: Any = torch.compile(encode, fullgraph=True, dynamic=False)
+        for name, call in (("record encoding", encode), ("record encoding, compiled", compiled)):
+
+            def check(call=call, rows=rows, peer=peer) -> None:
+                for theirs in (peer.default, peer.tuned):
+                    assert torch.equal(call(rows[0]).float(), plain(theirs(rows[0])).clamp(-1, 1))
+
+            yield Case(
+                name,
+                f"B={batch} n={sensors} V={levels} d={dim}",
+                lambda index, call=call, rows=rows: call(rows[index]),
+                {
+                    "torchhd.hash_table": lambda index, peer=peer, rows=rows: peer.default(rows[index]),
+                    "torchhd.multiset, table bound by hand": lambda index, peer=peer, rows=rows: peer.tuned(
+                        rows[index]
+                    ),
+                },
+                check,
+                floor,
+            )
 
 
 class Peer:

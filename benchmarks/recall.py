@@ -15,7 +15,8 @@ from benchmarks.literal import Literal
 def cases(device: str, small: bool = False) -> Iterator[Case]:
     """2,048 queries, and one at a time; from readings to commands, similarity and familiarity.
 
-    The peer begins with bins and leaves out the margin.
+    What a robot reads falls into few bins, so that many rows of a batch are equal and ours asks about them once; also
+    asked are rows that all differ. The peer begins with bins and leaves out the margin.
     """
     dim, count, batch = (256, 300, 8) if small else (4000, 20_000, 2048)
     shown, space = corral.samples(count), corral.space(dim, device)
@@ -24,12 +25,18 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     literal.learn(space.bins(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)
     compiled: Any = torch.compile(Reflex(behaviour), fullgraph=True, dynamic=False)
-    for name, ask, rows in (
-        ("Algorithm 2", behaviour, batch),
-        ("Algorithm 2, one control tick", behaviour, 1),
-        ("Algorithm 2, one control tick, compiled", compiled, 1),
+    for name, ask, rows, differ in (
+        ("Algorithm 2", behaviour, batch, False),
+        ("Algorithm 2, all different", behaviour, batch, True),
+        ("Algorithm 2, one control tick", behaviour, 1, False),
+        ("Algorithm 2, one control tick, compiled", compiled, 1, False),
     ):
-        readings = [shown.sensors[torch.randint(count, (rows,), generator=generator)] for _ in range(INPUTS)]
+        readings = [
+            corral.different(space, rows, generator)
+            if differ
+            else shown.sensors[torch.randint(count, (rows,), generator=generator)]
+            for _ in range(INPUTS)
+        ]
         bins = [space.bins(some) for some in readings]
         # The peer answers rows of bins, one without a batch dimension.
         asked = [some[0] if rows == 1 else some for some in bins]
@@ -48,4 +55,5 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
             {"literal steps on torchhd": lambda index, asked=asked: literal.recall(asked[index])},
             check,
             calls=1 if rows > 1 else (4 if small else 100),
+            more={"distinct": min(len(some.unique(dim=0)) for some in bins)},
         )

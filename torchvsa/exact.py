@@ -10,6 +10,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from torchvsa.blocks import by_blocks
+from torchvsa.operators import product
 
 
 def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
@@ -22,8 +23,9 @@ def is_integer(x: Tensor) -> bool:
     return not (x.is_floating_point() or x.is_complex())
 
 
-_FEW = 16
-"""Fewer items than these stand on the left of an int8 product of many rows, where it is faster."""
+_FEWEST, _FEW = 3, 16
+"""An int8 product of many rows is fastest with one item at a time if they are so few, and else, if they are fewer than
+the second number, with the items on its left."""
 
 
 def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
@@ -37,20 +39,24 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
         wide = torch.promote_types(a.dtype, b.dtype)
         a, b = (torch.view_as_real(x.to(wide).resolve_conj()).flatten(-2) for x in (a, b))
-        return a @ b.T
+        return product(a, b)
     int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
     if int8 and a.device.type == "cpu" and a.shape[-1] > 1:
         # The int8 units of the CPU, summing in int32 (they answer nonsense where d = 1).
         rows = a.reshape(-1, a.shape[-1])
-        if len(b) < _FEW < len(rows):
-            return torch.ops.aten._int_mm(b, rows.T).T.reshape(*a.shape[:-1], len(b))
-        return torch.ops.aten._int_mm(rows, b.T).reshape(*a.shape[:-1], len(b))
+        if len(b) <= _FEWEST and len(rows) > _FEW:
+            products = torch.cat([torch.ops.aten._int_mm(rows, item) for item in b.T.split(1, -1)], -1)
+        elif len(b) < _FEW < len(rows):
+            products = torch.ops.aten._int_mm(b, rows.T).T
+        else:
+            products = torch.ops.aten._int_mm(rows, b.T)
+        return products.reshape(*a.shape[:-1], len(b))
     if is_integer(a) or is_integer(b):
         # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
         wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)
-        return a.to(wide) @ b.to(wide).T
-    wide = torch.promote_types(a.dtype, b.dtype)
-    return a.to(wide) @ b.to(wide).T
+    else:
+        wide = torch.promote_types(a.dtype, b.dtype)
+    return product(a.to(wide), b.to(wide))
 
 
 def paired_dots(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:

@@ -121,26 +121,26 @@ class SelfShift(Protection):
 
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""
-        if is_integer(x) and x.dtype != torch.bool:
-            marks = x.clamp(0, 1).to(torch.int8)  # several times faster than comparing, and the same for integers
-        else:
-            marks = self.vsa.positive(x).to(torch.int8)
-        sums = dots(marks, self.columns).to(torch.int64)
+        rows = x.reshape(-1, self.vsa.dim)
+        sums = by_blocks(self._sums, rows, row_bytes=self.vsa.dim).reshape(*x.shape[:-1], len(self.columns))
+        sums = sums.to(torch.int64)
         count, total = sums[..., 0], (sums[..., 1:] * self.places).sum(-1)
         if self.width_rule == "sum":
             return total % self.vsa.dim
         return (2 * total + count) // (2 * count).clamp(min=1)
 
+    def _sums(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch columns"]:
+        """How many elements are > 0, and the sums of the digits of their indices."""
+        if is_integer(rows) and rows.dtype != torch.bool:
+            marks = rows.clamp(0, 1).to(torch.int8)  # several times faster than comparing, and the same for integers
+        else:
+            marks = self.vsa.positive(rows).to(torch.int8)
+        return dots(marks, self.columns)
+
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Superpose `x` with `h`, then shift by the width of `x`."""
         self.vsa.check(x, "x")
-        rows = x.reshape(-1, self.vsa.dim)
-        # The longest step between holds each row written twice.
-        return by_blocks(self._protect, rows, row_bytes=2 * rows.element_size() * self.vsa.dim).reshape(x.shape)
-
-    def _protect(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch d"]:
-        named = self.vsa.bundle_two(rows, self.h.to(rows.dtype))
-        return self.vsa.permute(named, self.width(rows))
+        return self.vsa.permute(self.vsa.bundle_two(x, self.h.to(x.dtype)), self.width(x))
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""

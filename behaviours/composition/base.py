@@ -10,7 +10,7 @@ from torch import Tensor, nn
 
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
-from behaviours.recall import Recall
+from behaviours.recall import Recall, asked_once
 
 
 class Policy(nn.Module, ABC):
@@ -37,7 +37,8 @@ class Policy(nn.Module, ABC):
     def forward(self, readings: Any) -> Recall:
         """Commands for readings; NaN commands and speaker -1 where no sensor was observed."""
         bins = self.space.bins(readings)
-        return self.ask(self.space.encode(bins)).blank((bins < 0).all(-1))
+        recall = asked_once(lambda rows: self.ask(self.space.encode(rows)), bins)
+        return recall.blank((bins < 0).all(-1))
 
     @abstractmethod
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:

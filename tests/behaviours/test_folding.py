@@ -26,9 +26,11 @@ def same(a: Recall, b: Recall) -> bool:
 @given(st.lists(st.integers(-(2**40), 2**40), min_size=1, max_size=6))
 @settings(max_examples=50, deadline=None)
 def test_digits_are_the_numbers(numbers: list[int]) -> None:
-    digits, weights = _digits(torch.tensor([numbers]))
-    assert digits.dtype == torch.int8
-    assert _joined(digits.T, weights)[:, 0].tolist() == numbers
+    # As many rows of numbers of one element, and one row of many.
+    for rows in (torch.tensor(numbers)[:, None], torch.tensor([numbers])):
+        digits, weights = _digits(rows)
+        assert digits.dtype == torch.int8
+        assert torch.equal(_joined(digits.T, weights).T, rows.to(torch.float64))
 
 
 @pytest.mark.parametrize("largest", [1, 127, 128, 40_000, 2**31 - 1])
@@ -41,7 +43,7 @@ def test_products_are_exact_for_programs_of_any_size(vsa: str, largest: int) -> 
     items, conditions = made.results(results), made.encode(made.bins(READINGS[:20]))
     folded = Folded(made.vsa, program, program, items)
     assert folded.digital
-    answers = folded(conditions)
+    answers = folded.answers(folded.products(conditions))
     codes = plain.wide(conditions).real
     noise = codes * program.double().numpy()
     lengths = (plain.wide(items).real ** 2).sum(1) ** 0.5

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from torchvsa.errors import ShapeError
 from torchvsa.exact import divide, is_integer, norms, paired_dots, signed
+from torchvsa.operators import rotated
 
 
 class VSA(ABC):
@@ -105,20 +106,11 @@ class VSA(ABC):
         self.check(x, "x")
         if isinstance(shifts, int):
             return torch.roll(x, shifts, -1)
-        batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
-        rows = x.expand(*batch, self.dim).reshape(-1, self.dim)
-        starts = (-shifts).remainder(self.dim).expand(batch).reshape(-1)
-        if rows.requires_grad or torch.compiler.is_exporting():
-            # The gradient of a window below would be built on all d windows of each row, and so would be the window in
-            # formats that know no views.
-            return rows.gather(-1, (starts[:, None] + torch.arange(self.dim, device=x.device)) % self.dim).reshape(
-                *batch, self.dim
-            )
-        # A rotation is a window of the vector written twice: copying whole windows beats gathering elements.
-        twice = torch.cat([rows, rows], -1).flatten()
-        windows = twice.as_strided((max(twice.numel() - self.dim + 1, 0), self.dim), (1, 1))
-        first = torch.arange(rows.shape[0], device=x.device) * (2 * self.dim)
-        return windows.index_select(0, first + starts).reshape(*batch, self.dim)
+        if shifts.shape != x.shape[:-1]:
+            batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
+            x, shifts = x.expand(*batch, self.dim), shifts.expand(batch)
+        starts = (-shifts).remainder(self.dim)
+        return rotated(x.reshape(-1, self.dim), starts.reshape(-1)).reshape(x.shape)
 
     def superpose(
         self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None

@@ -107,7 +107,11 @@ class MAP(VSA):
         if self.variant != "C":
             return super().bundle_two(a, b)
         # Two elements of [-1, 1] add up within the codes' own type.
-        return (a + b).clamp(-1, 1).to(self.dtype)
+        total = a + b
+        if is_integer(total) and not torch.compiler.is_compiling():
+            # Clipped in place by the one function that does so with `vmap` too (its gradient is not that of `clamp`).
+            return torch.nn.functional.hardtanh_(total).to(self.dtype)
+        return total.clamp(-1, 1).to(self.dtype)
 
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)

@@ -1,0 +1,111 @@
+"""The operators of our own: what they say is what the line of PyTorch says, wherever that can be said."""
+
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+import pytest
+import torch
+from torch import Tensor
+from torch.func import jacrev, jvp, vmap
+from torch.testing import assert_close
+
+from torchvsa import operators
+from torchvsa.exact import dots
+from torchvsa.operators import product, rotated
+
+TYPES = [torch.int8, torch.bool, torch.int32, torch.float32, torch.float64, torch.complex64]
+
+
+def drawn(*shape: int, dtype: torch.dtype = torch.float64, seed: int = 0) -> Tensor:
+    numbers = torch.randint(-3, 4, shape, generator=torch.Generator().manual_seed(seed))
+    return numbers.to(dtype)
+
+
+def turned(rows: Tensor, starts: Tensor) -> Tensor:
+    """By NumPy, one row after the other."""
+    pairs = zip(rows.numpy(), starts.tolist(), strict=True)
+    return torch.from_numpy(np.stack([np.roll(row, -start) for row, start in pairs]))
+
+
+def whole(function: Callable[..., Any]) -> Callable[..., Any]:
+    return torch.compile(function, fullgraph=True, backend="aot_eager")
+
+
+@pytest.mark.parametrize("dtype", TYPES, ids=str)
+@pytest.mark.parametrize("count", [1, 2, 4, 5, 11])
+def test_rows_are_rotated_wherever_blocks_end(count: int, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows, starts = drawn(count, 7, dtype=dtype), drawn(count, dtype=torch.int64, seed=1) + 3
+    expected = turned(rows, starts)
+    assert torch.equal(rotated(rows, starts), expected)
+    assert torch.equal(whole(rotated)(rows, starts), expected)
+    monkeypatch.setattr(operators, "CACHE_BYTES", 2 * 2 * 7 * rows.element_size())
+    assert torch.equal(rotated(rows, starts), expected)
+    torch.compiler.reset()
+
+
+def test_no_row_is_rotated() -> None:
+    assert rotated(torch.empty(0, 7), torch.empty(0, dtype=torch.int64)).shape == (0, 7)
+
+
+@pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
+@pytest.mark.parametrize("cache", [2**20, 1])
+def test_rotations_are_mapped_and_differentiated(cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operators, "CACHE_BYTES", cache)
+    rows, starts = drawn(3, 4, 5), torch.arange(12).view(3, 4) % 5
+    expected = torch.stack([turned(some, first) for some, first in zip(rows, starts, strict=True)])
+    assert torch.equal(vmap(rotated)(rows, starts), expected)
+    assert torch.equal(
+        vmap(rotated, (1, None))(rows.transpose(0, 1), starts[0]), vmap(rotated, (0, None))(rows, starts[0])
+    )
+    assert torch.equal(vmap(rotated, (None, 0))(rows[0], starts)[2], turned(rows[0], starts[2]))
+    value, slope = cast(Any, jvp(lambda x: rotated(x, starts[0]), (rows[0],), (rows[1],)))
+    assert torch.equal(value, turned(rows[0], starts[0]))
+    assert torch.equal(slope, turned(rows[1], starts[0]))
+    leaf = rows[0].clone().requires_grad_()
+    (rotated(leaf, starts[0]) * rows[1]).sum().backward()
+    assert leaf.grad is not None
+    assert torch.equal(leaf.grad, turned(rows[1], (-starts[0]) % 5))
+
+
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+@pytest.mark.parametrize("shape", [(3, 9), (16, 9), (4, 5, 9), (40, 9), (16, 1), (9,), (0, 9)])
+@pytest.mark.parametrize("items", [1, 2, 17])
+def test_products_are_those_of_pytorch(shape: tuple[int, ...], items: int, dtype: torch.dtype) -> None:
+    a, b = drawn(*shape, dtype=dtype), drawn(items, shape[-1], dtype=dtype, seed=1)
+    assert torch.equal(product(a, b), a @ b.T)  # whole numbers, which no order of additions rounds
+    assert torch.equal(whole(product)(a, b), a @ b.T)
+    assert product(a, b).dtype == dtype
+    torch.compiler.reset()
+
+
+def test_products_of_floats_are_as_near_as_those_of_pytorch() -> None:
+    a, b = (torch.randn(64, 1000, generator=torch.Generator().manual_seed(seed)) for seed in (0, 1))
+    assert_close(product(a, b).double(), a.double() @ b.double().T, atol=1e-4, rtol=0)
+    strided = torch.randn(1000, 64, generator=torch.Generator().manual_seed(2)).T
+    assert_close(product(strided, b[::2]).double(), strided.double() @ b[::2].double().T, atol=1e-4, rtol=0)
+
+
+@pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
+def test_products_are_mapped_and_differentiated() -> None:
+    a, b = drawn(3, 20, 5, dtype=torch.float32), drawn(3, 4, 5, dtype=torch.float32, seed=1)
+    assert torch.equal(vmap(product)(a, b), a @ b.mT)
+    assert torch.equal(vmap(product, (0, None))(a, b[0]), a @ b[0].T)
+    assert torch.equal(vmap(product, (None, 0))(a[0], b), a[0] @ b.mT)
+    value, slope = cast(Any, jvp(product, (a[0], b[0]), (a[1], b[1])))
+    assert torch.equal(value, a[0] @ b[0].T)
+    assert torch.equal(slope, a[1] @ b[0].T + a[0] @ b[1].T)
+    assert torch.equal(jacrev(lambda x: product(a[0], x).sum())(b[0]), a[0].sum(0).expand(4, 5))
+    leaf = a[0].clone().requires_grad_()
+    product(leaf, b[0]).sum().backward()
+    assert leaf.grad is not None
+    assert torch.equal(leaf.grad, b[0].sum(0).expand(20, 5))
+
+
+@pytest.mark.parametrize("items", range(1, 19))
+@pytest.mark.parametrize("rows", [1, 16, 17, 40])
+def test_integer_products_of_any_few_items_are_exact(rows: int, items: int) -> None:
+    generator = torch.Generator().manual_seed(rows)
+    a, b = (torch.randint(-128, 128, (count, 333), generator=generator, dtype=torch.int8) for count in (rows, items))
+    assert (dots(a, b).numpy() == a.numpy().astype(np.int64) @ b.numpy().astype(np.int64).T).all()
+    assert dots(a, b).dtype == torch.int32
