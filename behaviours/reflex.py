@@ -18,6 +18,9 @@ class Reflex(nn.Module):
 
         tick = torch.compile(Reflex(behaviour), fullgraph=True)
         tick(torch.tensor([[0.3, 1.2, 0.5]], dtype=torch.float64)).commands
+
+    Nothing in it changes: a compiled one need not look at each call whether its modules did, which saves a tenth of it
+    (`options={"guard_filter_fn": torch.compiler.skip_guard_on_all_nn_modules_unsafe}`).
     """
 
     commands: Tensor

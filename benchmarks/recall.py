@@ -24,7 +24,8 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     behaviour = rule.fit(space, shown)
     literal.learn(space.bins(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)
-    compiled: Any = torch.compile(Reflex(behaviour), fullgraph=True, dynamic=False)
+    options: Any = {"guard_filter_fn": torch.compiler.skip_guard_on_all_nn_modules_unsafe}
+    compiled: Any = torch.compile(Reflex(behaviour), fullgraph=True, dynamic=False, options=options)
     for name, ask, rows, differ in (
         ("Algorithm 2", behaviour, batch, False),
         ("Algorithm 2, all different", behaviour, batch, True),

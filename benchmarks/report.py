@@ -22,12 +22,7 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
         for title in ("work", "shape", "threads", "ours", "peer", "theirs", "ratio", "floor", "of floor"):
             table.add_column(title, justify="left" if title in ("work", "shape", "peer", "floor") else "right")
         for row in compared:
-            ratio = "-" if row["ratio"] is None else f"{row['ratio']:.1f}"
-            above = "-" if row["of_floor"] is None else f"{row['of_floor']:.1f}"
-            table.add_row(
-                row["work"], row["shape"], str(row["threads"]), time_of(row["ours_s"]), row["peer"] or "-",
-                time_of(row["peer_s"]), ratio, row["floor"] or "-", above,
-            )  # fmt: skip
+            table.add_row(*_cells(row))
         console.print(table)
     grown = [row for row in rows if "exponent" in row]
     if grown:
@@ -49,11 +44,7 @@ def fill(page: Path, rows: Sequence[Row]) -> None:
         lines = ["| work | size | threads | ours | peer | theirs | ratio | floor | times the floor |"]
         lines.append("|---|---|---:|---:|---|---:|---:|---|---:|")
         for row in compared:
-            ratio = "-" if row["ratio"] is None else f"{row['ratio']:.1f}"
-            above = "-" if row["of_floor"] is None else f"{row['of_floor']:.1f}"
-            cells = (row["work"], row["shape"], row["threads"], time_of(row["ours_s"]), row["peer"] or "-")
-            more = (time_of(row["peer_s"]), ratio, row["floor"] or "-", above)
-            lines.append(f"| {' | '.join(map(str, (*cells, *more)))} |")
+            lines.append(f"| {' | '.join(_cells(row))} |")
         text = _between(text, "table", [f"{compared[0]['machine']}:", "", *lines])
     if grown:
         lines = ["| work | sizes | time of the largest | exponent | at the top |", "|---|---|---:|---:|---:|"]
@@ -62,6 +53,20 @@ def fill(page: Path, rows: Sequence[Row]) -> None:
             lines.append(f"| {row['work']} | {row['shape']} | {time_of(row['ours_s'])} | {exponents} |")
         text = _between(text, "growth", lines)
     write_atomically(page, text.encode())
+
+
+def _cells(row: Row) -> list[str]:
+    """A row beside a peer, as text."""
+    ours, theirs = time_of(row["ours_s"]), time_of(row["peer_s"])
+    named = [row["work"], row["shape"], str(row["threads"]), ours, row["peer"] or "-", theirs, _times(row["ratio"])]
+    return [*named, row["floor"] or "-", _times(row["of_floor"])]
+
+
+def _times(ratio: float | None) -> str:
+    """A ratio, with two decimals where it is near 1."""
+    if ratio is None:
+        return "-"
+    return f"{ratio:.2f}" if ratio < 2 else f"{ratio:.1f}"
 
 
 def _between(text: str, mark: str, lines: Sequence[str]) -> str:

@@ -80,7 +80,9 @@ def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
 
 def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
     # Floats are summed fastest, and are exact below 2^24, which 1,023 squares of int8 cannot reach.
-    return torch.stack([part.to(torch.float32).square().sum(-1).to(torch.float64) for part in x.split(1023, -1)]).sum(0)
+    squares = x.to(torch.float32)
+    squares *= squares
+    return torch.stack([part.sum(-1).to(torch.float64) for part in squares.split(1023, -1)]).sum(0)
 
 
 def root(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
