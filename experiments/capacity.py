@@ -21,6 +21,7 @@ import torch
 from omegaconf import DictConfig
 from rich.console import Console
 
+from experiments.choices import check_chosen, check_differ
 from experiments.command_line import errors_in_one_line, job
 from experiments.driving import progress_bars, workers
 from experiments.pairs_held import CONDITIONS, Row, bracket, expected, halve, measure, parts
@@ -59,15 +60,11 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
 
 def check(config: Mapping[str, Any]) -> None:
     """Raise, naming the setting, for what cannot be measured."""
-    for row in config["rows"]:
-        if row not in config["learners"]:
-            raise ValueError(
-                f"rows: there is no {row!r} among the learners; choose from {', '.join(config['learners'])}"
-            )
-    for setting in ("rows", "dims", "pairs"):
-        if len(set(config[setting])) != len(config[setting]) or not config[setting]:
-            raise ValueError(f"{setting} must name at least one, none twice; got {list(config[setting])}")
+    check_chosen("rows", config["rows"], config["learners"])
     for setting, most in (("dims", None), ("pairs", CONDITIONS)):
+        check_differ(setting, config[setting])
+        if not config[setting]:
+            raise ValueError(f"{setting} is empty; name at least one number")
         for number in config[setting]:
             if number < 1 or (most is not None and number > most):
                 raise ValueError(f"{setting} are whole numbers from 1{f' to {most}' if most else ''}; got {number}")

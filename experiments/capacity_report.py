@@ -15,7 +15,6 @@ from rich.table import Table
 from behaviours.storage import write_atomically
 from experiments.capacity import CLOSED_FORM, recalls
 from experiments.corral_tables import number
-from experiments.corral_text import as_yaml
 from experiments.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, STYLE, VERMILION, png
 from experiments.pairs_held import LEVELS, RESULTS, SCHEMA, VALUES, expected
 from experiments.report import Page
@@ -66,9 +65,7 @@ def write_report(folder: Path, results: Results) -> Path:
         "for that many.",
     )
     page.section("How it was measured").text(*method(config))
-    again = page.section("How to reproduce")
-    again.text("The same settings give the same numbers, times aside.")
-    again.code(as_yaml(config), "All settings of this run:")
+    page.how_to_reproduce(config)
     return page.write(folder / "report.html")
 
 

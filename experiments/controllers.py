@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -193,15 +193,3 @@ CONTROLLERS: dict[str, Callable[[Study], Controller]] = {
     "random": _random,
     "teacher_wheeled": _teacher_wheeled,
 }
-
-
-def check_names(names: Iterable[str]) -> None:
-    """Raise unless every name is a row of the table, none twice."""
-    names = list(names)
-    for name in names:
-        if name not in CONTROLLERS:
-            raise ValueError(f"there is no controller {name!r}; choose from {', '.join(CONTROLLERS)}")
-        if names.count(name) > 1:
-            raise ValueError(f"controller {name!r} is named {names.count(name)} times")
-    if not names:
-        raise ValueError(f"controllers is empty; choose from {', '.join(CONTROLLERS)}")

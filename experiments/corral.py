@@ -26,8 +26,9 @@ import sim
 from behaviours import Behaviour, BehaviourBank, Policy, Space
 from experiments import presets
 from experiments.agreement import Agreement, measure
+from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
-from experiments.controllers import CONTROLLERS, Controller, Study, check_names
+from experiments.controllers import CONTROLLERS, Controller, Study
 from experiments.driving import Driver, progress_bars, workers
 from experiments.lessons import FIRST_DEMONSTRATION, FIRST_VALIDATION, from_file, shown_in
 from experiments.results import Results, Row
@@ -55,7 +56,7 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     """Run the whole comparison and write it to `folder`."""
     began = time.perf_counter()
     results = Results("corral", config, config["seed"])
-    check_names(config["controllers"])
+    check_chosen("controllers", config["controllers"], CONTROLLERS)
     # Settings that cannot be built are found before anything is driven.
     reference = presets.space(config["vsa"], config, config["seed"])
     presets.rule(config["rule"])

@@ -78,11 +78,10 @@ def write_report(
     run = CorralRun(folder, results, controllers, rollouts, agreements, train, heldout)
     (folder / "figures").mkdir(exist_ok=True)
     page = Page("Corral escape: one hypervector drives a robot", corral_text.lead(results.config))
-    parts = (
-        _what, _table, _success, _corral, _animation, _maps, _timelines, _printed, _where_it_fails, _bodies, _again
-    )  # fmt: skip
+    parts = (_what, _table, _success, _corral, _animation, _maps, _timelines, _printed, _where_it_fails, _bodies)
     for part in progress.track(parts, description="report"):
         part(run, page)
+    page.how_to_reproduce(results.config, corral_text.command(folder))
     return page.write(folder / "report.html")
 
 
@@ -265,13 +264,6 @@ def _bodies(run: CorralRun, page: Page) -> None:
     columns, rows = corral_tables.bodies_table([planar, wheeled])
     section.table(columns, rows)
     section.text(corral_text.bodies_summary(planar, wheeled))
-
-
-def _again(run: CorralRun, page: Page) -> None:
-    section = page.section("How to reproduce")
-    section.text("The same settings give the same numbers, times aside.")
-    section.code(corral_text.command(run.folder))
-    section.code(corral_text.as_yaml(run.results.config), "All settings of this run:")
 
 
 def _show(run: CorralRun, section: Section, name: str, draw: Callable[[], Figure], alt: str, caption: str) -> None:

@@ -189,8 +189,3 @@ def command(folder: Path) -> str:
     kept = folder / ".hydra" / "overrides.yaml"
     given = [str(item) for item in OmegaConf.to_container(OmegaConf.load(kept)) or []] if kept.is_file() else []
     return shlex.join(["python", "-m", "experiments.corral", *given])
-
-
-def as_yaml(config: Mapping[str, Any]) -> str:
-    """All settings, as a user would write them."""
-    return OmegaConf.to_yaml(OmegaConf.create(dict(config)))

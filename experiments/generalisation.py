@@ -26,6 +26,7 @@ from experiments import generalisation_fit_times as fit_times
 from experiments import generalisation_smooth as smooth
 from experiments import generalisation_wall_following as wall_following
 from experiments import torchhd_classifiers
+from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.driving import progress_bars, workers
 from experiments.results import Results, Row
@@ -64,8 +65,7 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
 def check(config: Mapping[str, Any]) -> None:
     """Raise, naming the setting, for what cannot be run, before anything is."""
     parts = list(config["parts"])
-    if not parts or len(set(parts)) < len(parts) or not set(parts) <= set(PARTS):
-        raise ValueError(f"parts names some of {', '.join(PARTS)}, none twice; got {parts}")
+    check_chosen("parts", parts, PARTS)
     if "fit_times" in parts and len(parts) > 1:
         raise ValueError(f"fit_times wants the machine to itself: parts=[fit_times]; got {parts}")
     for setting in ("workers", "robots"):

@@ -24,6 +24,7 @@ from behaviours import Demonstrations, Space
 from behaviours.ordered import distinct_rows
 from experiments import presets
 from experiments.agreement import right
+from experiments.choices import check_chosen
 from experiments.controllers import Classified, Recalled
 from experiments.driving import drive_here, pooled_success
 from experiments.jobs import run_jobs
@@ -113,13 +114,9 @@ def check(config: Mapping[str, Any], seed: int, vsa: Mapping[str, Any]) -> None:
         raise ValueError(f"corral.arenas begins with {HOME!r}, where the teacher is watched; got {config['arenas']}")
     for name in config["arenas"]:
         presets.arena({"preset": name, "change": {}})
-    for name in config["rivals"]:
-        if name not in RIVALS:
-            raise ValueError(f"corral.rivals: there is no {name!r}; choose from {', '.join(RIVALS)}")
+    check_chosen("corral.rivals", config["rivals"], RIVALS, empty=True)
     for part in PARTS:
-        names, choices = list(config[part]), config["options"][part]
-        if not names or len(set(names)) < len(names) or not set(names) <= set(choices):
-            raise ValueError(f"corral.{part} names some of {', '.join(choices)}, none twice; got {names}")
+        check_chosen(f"corral.{part}", config[part], config["options"][part])
     for combination in combinations(config):
         _space(config, vsa, combination, seed)
         presets.rule(config["options"]["rule"][combination.rule])

@@ -9,7 +9,6 @@ from pathlib import Path
 from rich.table import Table
 
 from behaviours.storage import write_atomically
-from experiments.corral_text import as_yaml
 from experiments.figures import png
 from experiments.generalisation_figures import PANELS, panels
 from experiments.report import Cell, Page
@@ -166,9 +165,7 @@ def write_report(folder: Path, results: Results, notes: Sequence[str] = ()) -> P
     drawn = [part for part in PANELS if any(row["part"] == part for row in results.table)]
     if drawn:
         write_atomically(folder / "figures" / "generalisation.png", png(panels(results.table, drawn), dpi=100))
-    again = page.section("How to reproduce")
-    again.text("The same settings give the same numbers, times aside.")
-    again.code(as_yaml(results.config), "All settings of this run:")
+    page.how_to_reproduce(results.config)
     return page.write(folder / "report.html")
 
 

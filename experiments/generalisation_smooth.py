@@ -26,6 +26,7 @@ from sklearn.preprocessing import StandardScaler
 import sim
 from behaviours import BehaviourClassifier, BehaviourRegressor
 from behaviours.data import load_wall_following
+from experiments.choices import check_chosen
 from experiments.driving import drive_here, pooled_success
 from experiments.generalisation_wall_following import FOLDS, blocks
 from experiments.jobs import run_jobs
@@ -106,9 +107,7 @@ class Regressed:
 def check(config: Mapping[str, Any]) -> None:
     """Raise, naming the setting, for what is not there."""
     for setting, choices in (("tasks", TASKS), ("models", MODELS)):
-        names = list(config[setting])
-        if not names or len(set(names)) < len(names) or not set(names) <= set(choices):
-            raise ValueError(f"smooth.{setting} names some of {', '.join(choices)}, none twice; got {names}")
+        check_chosen(f"smooth.{setting}", config[setting], choices)
     for setting, least in (("dims", 1), ("levels", 2)):
         if not config[setting] or min(config[setting]) < least:
             raise ValueError(f"smooth.{setting} are numbers from {least} on; got {list(config[setting])}")

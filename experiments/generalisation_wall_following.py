@@ -29,6 +29,7 @@ from sklearn.tree import DecisionTreeClassifier
 from behaviours import BehaviourClassifier
 from behaviours.data import load_wall_following
 from experiments import torchhd_classifiers
+from experiments.choices import check_chosen
 from experiments.jobs import run_jobs
 from experiments.results import Row
 from experiments.torchhd_classifiers import TorchHD
@@ -90,13 +91,7 @@ def check(config: Mapping[str, Any]) -> None:
     """Raise, naming the setting, for what is not there."""
     choices_of = {"models": MODELS, "stratified_only": MODELS, "splits": SPLITS, "sensors": (24, 4, 2)}
     for setting, choices in choices_of.items():
-        names = list(config[setting])
-        for name in names:
-            if name not in choices:
-                listed = ", ".join(map(str, choices))
-                raise ValueError(f"wall_following.{setting}: there is no {name!r}; choose from {listed}")
-        if len(set(names)) < len(names) or (not names and setting != "stratified_only"):
-            raise ValueError(f"wall_following.{setting} must name at least one, none twice; got {names}")
+        check_chosen(f"wall_following.{setting}", config[setting], choices, empty=setting == "stratified_only")
     if config["torchhd_epochs"] is not None and config["torchhd_epochs"] < 1:
         raise ValueError(f"wall_following.torchhd_epochs={config['torchhd_epochs']}: expected 1 or more, or null")
 

@@ -11,7 +11,7 @@ then drive. What a learner may choose, it chooses on validation runs; the held-o
 """
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,7 @@ from rich.console import Console
 import sim
 from behaviours.remembering import check_lags
 from experiments import presets
+from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.driving import Driver, drive_here, progress_bars, workers
 from experiments.jobs import run_jobs
@@ -128,8 +129,8 @@ def _episodes(rollout: sim.Rollout) -> list[Row]:
 
 def check(config: Mapping[str, Any]) -> None:
     """Raise `ValueError` for settings that name what is not there, before anything is driven."""
-    _check_names("learner", config["learners"], LEARNERS)
-    _check_names("disturbance", config["disturbances"], DISTURBANCES)
+    check_chosen("learners", config["learners"], LEARNERS)
+    check_chosen("disturbances", config["disturbances"], DISTURBANCES)
     for name in config["disturbances"]:
         strengths = config["strengths"][name]
         if not strengths or strengths[0] != 0 or sorted(set(strengths)) != list(strengths):
@@ -145,17 +146,6 @@ def check(config: Mapping[str, Any]) -> None:
             raise ValueError(f"{setting} is empty; name at least one choice")
     for lags in config["lags"]:
         check_lags(lags)
-
-
-def _check_names(kind: str, names: Iterable[str], known: Iterable[str]) -> None:
-    names, known = list(names), list(known)
-    if not names:
-        raise ValueError(f"no {kind} is named; choose from {', '.join(known)}")
-    for name in names:
-        if name not in known:
-            raise ValueError(f"there is no {kind} {name!r}; choose from {', '.join(known)}")
-        if names.count(name) > 1:
-            raise ValueError(f"{kind} {name!r} is named {names.count(name)} times")
 
 
 @hydra.main(version_base="1.3", config_path="pkg://experiments.conf", config_name="observability")

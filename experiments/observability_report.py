@@ -11,7 +11,6 @@ from rich.console import Console
 from rich.table import Table
 
 from behaviours.storage import write_atomically
-from experiments.corral_text import as_yaml
 from experiments.figures import png
 from experiments.observability_curves import FIGURES, curves
 from experiments.observability_disturbances import DISTURBANCES
@@ -51,9 +50,7 @@ def write_report(folder: Path, results: Results) -> Path:
             "Mean over the strengths above 0. Green: the choice that was taken.",
             words=True,
         )
-    section = page.section("How to reproduce")
-    section.text("The same settings give the same numbers, times aside.")
-    section.code(as_yaml(config), "All settings of this run:")
+    page.how_to_reproduce(config)
     return page.write(folder / "report.html")
 
 

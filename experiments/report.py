@@ -14,10 +14,11 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import jinja2
 from markupsafe import Markup, escape
+from omegaconf import OmegaConf
 
 from behaviours.storage import write_atomically
 
@@ -99,6 +100,14 @@ class Page:
         section = Section(title)
         self.sections.append(section)
         return section
+
+    def how_to_reproduce(self, config: Mapping[str, Any], *commands: str) -> None:
+        """End with what it takes to run the same again: commands, if any, and all settings."""
+        section = self.section("How to reproduce")
+        section.text("The same settings give the same numbers, times aside.")
+        for command in commands:
+            section.code(command)
+        section.code(OmegaConf.to_yaml(OmegaConf.create(dict(config))), "All settings of this run:")
 
     def html(self) -> str:
         """The page as text; whatever was given is escaped."""

@@ -28,6 +28,7 @@ import sim
 import torchvsa
 from behaviours import Demonstrations
 from experiments import hand_written, presets
+from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.damage import DAMAGES, PARAMETERS, PARTS, Damage, Damaged, Floats, Learner
 from experiments.damaged_programs import Programmed
@@ -108,11 +109,7 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
 def check(config: Mapping[str, Any]) -> None:
     """Raise, naming the setting, for names that do not exist and shares that make no sense."""
     for setting, choices in (("learners", LEARNERS), ("parts", PARTS), ("damages", DAMAGES)):
-        for name in config[setting]:
-            if name not in choices:
-                raise ValueError(f"{setting}: there is no {name!r}; choose from {', '.join(choices)}")
-        if len(set(config[setting])) != len(config[setting]) or not config[setting]:
-            raise ValueError(f"{setting} must name at least one, none twice; got {list(config[setting])}")
+        check_chosen(setting, config[setting], choices)
     shares = list(config["shares"])
     if not shares or shares != sorted(set(shares)) or shares[0] != 0 or shares[-1] > 1:
         raise ValueError(f"shares must begin with 0 and rise to at most 1; got {shares}")

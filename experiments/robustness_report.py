@@ -15,7 +15,6 @@ from rich.table import Table
 
 from behaviours.storage import write_atomically
 from experiments.corral_tables import number
-from experiments.corral_text import as_yaml
 from experiments.figures import BLUE, GREEN, GREY, ORANGE, STYLE, VERMILION, png
 from experiments.report import Page
 from experiments.results import Results, Row
@@ -73,9 +72,7 @@ def write_report(folder: Path, results: Results) -> Path:
     page.section("How it was measured").text(*METHOD)
     numbers = page.section("All numbers")
     numbers.table(list(table[0]), [[_cell(value) for value in row.values()] for row in table])
-    again = page.section("How to reproduce")
-    again.text("The same settings give the same numbers, times aside.")
-    again.code(as_yaml(config), "All settings of this run:")
+    page.how_to_reproduce(config)
     return page.write(folder / "report.html")
 
 

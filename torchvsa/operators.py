@@ -14,16 +14,21 @@ from torch.autograd import forward_ad
 from torchvsa.blocks import CACHE_BYTES
 
 
-def rotated(rows: Shaped[Tensor, "batch d"], starts: Int[Tensor, "batch"]) -> Shaped[Tensor, "batch d"]:
-    """Each row from its element `start` in `[0, d)` to its end, then from its beginning."""
+def rotated(
+    rows: Shaped[Tensor, "batch d"], starts: Int[Tensor, "batch"], added: Shaped[Tensor, "d"] | None = None
+) -> Shaped[Tensor, "batch d"]:
+    """Each row from its element `start` in `[0, d)` to its end, then from its beginning.
+
+    With `added`, of the rows' own integer type, each row is its sum with that, clipped to [-1, 1].
+    """
     if torch.compiler.is_exporting() or _differentiated(rows):
         # The gradient of a window would be built on all d windows of each row, and export formats know no windows.
         columns = torch.arange(rows.shape[1], device=rows.device)
-        return rows.gather(-1, (starts[:, None] + columns) % rows.shape[1])
+        return _clipped_sum(rows, added).gather(-1, (starts[:, None] + columns) % rows.shape[1])
     # A compiler copies many rows element by element, but moves a single one within the steps around it.
     if rows.shape[0] > (1 if torch.compiler.is_compiling() else _at_once(rows)):
-        return torch.ops.torchvsa.rotate(rows, starts)
-    return _together(rows, starts)
+        return torch.ops.torchvsa.rotate(rows, starts, added)
+    return _together(_clipped_sum(rows, added), starts)
 
 
 def product(a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
@@ -49,6 +54,10 @@ def _at_once(rows: Tensor) -> int:
     return max(CACHE_BYTES // (2 * rows.shape[1] * rows.element_size()), 1) if rows.device.type == "cpu" else len(rows)
 
 
+def _clipped_sum(rows: Tensor, added: Tensor | None) -> Tensor:
+    return rows if added is None else (rows + added).clamp(-1, 1)
+
+
 def _together(rows: Tensor, starts: Tensor) -> Tensor:
     # A rotation is a window of the row written twice: copying whole windows beats gathering elements.
     twice = torch.cat([rows, rows], -1).flatten()
@@ -65,15 +74,20 @@ def _begins(rows: Tensor) -> Tensor:
 
 
 @torch.library.custom_op("torchvsa::rotate", mutates_args=())
-def _rotate(rows: Tensor, starts: Tensor) -> Tensor:
+def _rotate(rows: Tensor, starts: Tensor, added: Tensor | None) -> Tensor:
     some = _at_once(rows)
     if len(rows) <= some:
-        return _together(rows, starts)
+        return _together(_clipped_sum(rows, added), starts)
     twice, answer = rows.new_empty(some, 2, rows.shape[1]), torch.empty_like(rows)
     windows, begins = _windows(twice.view(-1), rows.shape[1]), _begins(rows[:some])
     for start in range(0, len(rows), some):
         block = rows[start : start + some]
-        twice[: len(block)] = block[:, None]
+        if added is None:
+            twice[: len(block)] = block[:, None]
+        else:
+            once = twice[: len(block), 0]
+            torch.add(block, added, out=once).clamp_(-1, 1)
+            twice[: len(block), 1] = once
         places = begins[: len(block)] + starts[start : start + some]
         torch.index_select(windows, 0, places, out=answer[start : start + some])
     return answer
@@ -85,7 +99,7 @@ def _product(a: Tensor, b: Tensor) -> Tensor:
 
 
 @_rotate.register_fake
-def _(rows: Tensor, starts: Tensor) -> Tensor:
+def _(rows: Tensor, starts: Tensor, added: Tensor | None) -> Tensor:
     return rows.new_empty(rows.shape)
 
 
@@ -103,9 +117,13 @@ def _stacked(info: Any, in_dims: tuple[int | None, ...], *tensors: Tensor) -> li
 
 
 @_rotate.register_vmap
-def _(info: Any, in_dims: tuple[int | None, ...], rows: Tensor, starts: Tensor) -> tuple[Tensor, int]:
-    rows, starts = _stacked(info, in_dims, rows, starts)
-    return _rotate(rows.flatten(0, 1), starts.flatten()).unflatten(0, (info.batch_size, -1)), 0
+def _(
+    info: Any, in_dims: tuple[int | None, ...], rows: Tensor, starts: Tensor, added: Tensor | None
+) -> tuple[Tensor, int]:
+    rows, starts = _stacked(info, in_dims[:2], rows, starts)
+    if in_dims[2] is not None and added is not None:
+        rows, added = _clipped_sum(rows, added.movedim(in_dims[2], 0)[:, None]), None
+    return _rotate(rows.flatten(0, 1), starts.flatten(), added).unflatten(0, (info.batch_size, -1)), 0
 
 
 @_product.register_vmap

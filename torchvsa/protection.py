@@ -140,7 +140,7 @@ class SelfShift(Protection):
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Superpose `x` with `h`, then shift by the width of `x`."""
         self.vsa.check(x, "x")
-        return self.vsa.permute(self.vsa.bundle_two(x, self.h.to(x.dtype)), self.width(x))
+        return self.vsa.bundle_two_and_permute(x, self.h.to(x.dtype), self.width(x))
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""

@@ -124,8 +124,8 @@ def test_the_closed_form_is_that_of_a_raw_sum() -> None:
     ("override", "words"),
     [
         ("rows=[nobody]", "rows: there is no 'nobody'"),
-        ("rows=[]", "rows must name at least one"),
-        ("dims=[100,100]", "none twice"),
+        ("rows=[]", "rows is empty; choose from literal, "),
+        ("dims=[100,100]", "dims names 100 2 times"),
         ("dims=[0]", "dims are whole numbers from 1; got 0"),
         ("pairs=[9000]", "pairs are whole numbers from 1 to 8000; got 9000"),
         ("accuracy=1.0", "accuracy is a share between 0 and 1"),
@@ -196,6 +196,6 @@ def test_a_wrong_setting_is_told_in_one_line(
         capacity.main()
     assert exit_.value.code == 1
     error = capsys.readouterr().err
-    assert error.startswith("capacity: rows: there is no 'nobody' among the learners; choose from literal, ")
+    assert error.startswith("capacity: rows: there is no 'nobody'; choose from literal, ")
     assert error.count("\n") == 1
     assert not list(tmp_path.rglob("results.json"))

@@ -12,7 +12,8 @@ from omegaconf import OmegaConf
 import sim
 from behaviours import Demonstrations
 from experiments import presets
-from experiments.controllers import CONTROLLERS, check_names
+from experiments.choices import check_chosen
+from experiments.controllers import CONTROLLERS
 
 CONF = Path(next(iter(import_module("experiments.conf").__path__)))
 OPTIONS = sorted(
@@ -46,7 +47,7 @@ def test_every_option_composes_and_builds(option: str) -> None:
     assert behaviour(readings).commands.isfinite().all()
     assert presets.arena(config["arena"]) == sim.ARENAS[config["arena"]["preset"]]
     assert config["body"]["name"] in sim.BODIES
-    check_names(config["controllers"])
+    check_chosen("controllers", config["controllers"], CONTROLLERS)
 
 
 def test_the_default_table_has_the_promised_rows() -> None:
@@ -73,8 +74,12 @@ def test_the_default_has_enough_bins_and_none_of_its_edges_is_a_threshold_of_the
 
 @pytest.mark.parametrize(
     ("names", "words"),
-    [(["nobody"], "there is no controller 'nobody'"), (["random", "random"], "named 2 times"), ([], "is empty")],
+    [
+        (["nobody"], "controllers: there is no 'nobody'; choose from"),
+        (["random", "random"], "controllers names 'random' 2 times"),
+        ([], "controllers is empty"),
+    ],
 )
 def test_wrong_rows_are_named(names: list[str], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        check_names(names)
+        check_chosen("controllers", names, CONTROLLERS)

@@ -143,10 +143,10 @@ def test_what_is_not_there_is_named() -> None:
     }  # fmt: skip
     check(config)
     for change, words in (
-        ({"learners": ["nobody"]}, "there is no learner 'nobody'"),
-        ({"disturbances": ["fog"]}, "there is no disturbance 'fog'"),
-        ({"disturbances": ["missing", "missing"]}, "'missing' is named 2 times"),
-        ({"learners": []}, "no learner is named; choose from teacher, "),
+        ({"learners": ["nobody"]}, "learners: there is no 'nobody'"),
+        ({"disturbances": ["fog"]}, "disturbances: there is no 'fog'"),
+        ({"disturbances": ["missing", "missing"]}, "disturbances names 'missing' 2 times"),
+        ({"learners": []}, "learners is empty; choose from teacher, "),
         ({"strengths": {"missing": [0.5]}}, "strengths.missing grow from 0"),
         ({"strengths": {"missing": [0, 2]}}, "from 0 to 1; got 2"),
         ({"starts": -1}, "starts=-1: expected 0 or more"),
@@ -218,5 +218,5 @@ def test_the_same_seed_gives_the_same_results_in_other_batches(finished: Path, t
 def test_an_error_is_one_line(tmp_path: Path) -> None:
     run = corral(tmp_path, "learners=[nobody]", module="experiments.observability")
     assert run.returncode == 1
-    assert run.stderr.startswith("observability: there is no learner 'nobody'; choose from teacher, ")
+    assert run.stderr.startswith("observability: learners: there is no 'nobody'; choose from teacher, ")
     assert run.stderr.count("\n") == 1

@@ -187,8 +187,8 @@ def test_copies_share_the_starts() -> None:
     ("override", "words"),
     [
         ("learners=[nobody]", "learners: there is no 'nobody'"),
-        ("parts=[]", "parts must name at least one"),
-        ("damages=[flip,flip]", "none twice"),
+        ("parts=[]", "parts is empty; choose from "),
+        ("damages=[flip,flip]", "damages names 'flip' 2 times"),
         ("shares=[0.1,0.2]", "begin with 0"),
         ("shares=[0,1.5]", "at most 1"),
         ("drive_shares=[0.15]", "0.15"),

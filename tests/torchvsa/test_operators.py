@@ -44,6 +44,24 @@ def test_rows_are_rotated_wherever_blocks_end(count: int, dtype: torch.dtype, mo
     torch.compiler.reset()
 
 
+@pytest.mark.parametrize("cache", [2**20, 2 * 2 * 7, 1])
+@pytest.mark.parametrize("count", [1, 4, 5])
+def test_rows_are_superposed_before_they_are_rotated(count: int, cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(operators, "CACHE_BYTES", cache)
+    codes = torch.randint(-1, 2, (3, count + 1, 7), generator=torch.Generator().manual_seed(count), dtype=torch.int8)
+    rows, added = codes[:, 1:], codes[:, 0]
+    starts = torch.arange(3 * count).view(3, count) % 7
+    expected = torch.stack(
+        [turned((x + y).clamp(-1, 1), first) for x, y, first in zip(rows, added, starts, strict=True)]
+    )
+    assert torch.equal(rotated(rows[0], starts[0], added[0]), expected[0])
+    assert torch.equal(whole(rotated)(rows[0], starts[0], added[0]), expected[0])
+    assert torch.equal(vmap(rotated)(rows, starts, added), expected)
+    alone = [rotated(x, starts[0], added[0]) for x in rows]
+    assert torch.equal(vmap(rotated, (0, None, None))(rows, starts[0], added[0]), torch.stack(alone))
+    torch.compiler.reset()
+
+
 def test_no_row_is_rotated() -> None:
     assert rotated(torch.empty(0, 7), torch.empty(0, dtype=torch.int64)).shape == (0, 7)
 

@@ -156,6 +156,12 @@ class VSA(ABC):
         """`bundle` of `a` and `b`, element by element of the (broadcast) batch."""
         return self.bundle(torch.stack(torch.broadcast_tensors(a, b), -2))
 
+    def bundle_two_and_permute(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """`permute(bundle_two(a, b), shifts)`, for those who can do both in one go."""
+        return self.permute(self.bundle_two(a, b), shifts)
+
     def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
         """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
         self.check(a, "a")

@@ -3,13 +3,14 @@
 from typing import Literal
 
 import torch
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.ties import first_two
 from torchvsa.exact import dots, is_integer, root
+from torchvsa.operators import rotated
 
 
 class MAP(VSA):
@@ -107,11 +108,16 @@ class MAP(VSA):
         if self.variant != "C":
             return super().bundle_two(a, b)
         # Two elements of [-1, 1] add up within the codes' own type.
-        total = a + b
-        if is_integer(total) and not torch.compiler.is_compiling():
-            # Clipped in place by the one function that does so with `vmap` too (its gradient is not that of `clamp`).
-            return torch.nn.functional.hardtanh_(total).to(self.dtype)
-        return total.clamp(-1, 1).to(self.dtype)
+        return (a + b).clamp(-1, 1).to(self.dtype)
+
+    def bundle_two_and_permute(
+        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]
+    ) -> Shaped[Tensor, "*batch d"]:
+        """See `VSA.bundle_two_and_permute`."""
+        if self.variant != "C" or not self.dtype == a.dtype == b.dtype == torch.int8:
+            return super().bundle_two_and_permute(a, b, shifts)
+        starts = (-shifts).remainder(self.dim)
+        return rotated(a.reshape(-1, self.dim), starts.reshape(-1), b).reshape(a.shape)
 
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
