@@ -24,6 +24,8 @@ def distinct_rows(rows: Shaped[Tensor, "N c"]) -> tuple[Shaped[Tensor, "k c"], I
     # Flat keys are found by sorting numbers, several times faster than sorting rows.
     _, which = keys.unique(return_inverse=True) if keys.dim() == 1 else keys.unique(dim=0, return_inverse=True)
     first = first_rows(which)
+    if len(first) == len(rows):
+        return rows, torch.arange(len(rows), device=rows.device)
     order = first.argsort()
     return rows[first[order]], order.argsort()[which]
 

@@ -16,6 +16,8 @@ HELD_BYTES = 2**27
 """Conditions that take no more are held as hypervectors."""
 _ROWS = 2048
 """Conditions encoded at once, where not all of them are held."""
+_PRINTS = 8
+"""Numbers in a fingerprint."""
 
 
 class Conditions:
@@ -61,7 +63,7 @@ def encode_distinct(
         encoded, merged = distinct_rows(space.encode(distinct))
         return encoded, merged[condition]
     first, merged = _merged(space, distinct, progress)
-    return Conditions(space, distinct[first]), merged[condition]
+    return Conditions(space, distinct if len(first) == len(distinct) else distinct[first]), merged[condition]
 
 
 def _merged(
@@ -73,11 +75,13 @@ def _merged(
     """
     seed = 0
     while True:
-        prints = []
-        for start, rows in enumerate(bins.split(_ROWS)):
-            prints.append(_fingerprints(space.encode(rows), seed))
-            progress(min((start + 1) * _ROWS / len(bins), 1.0))
-        distinct, merged = distinct_rows(torch.cat(prints))
+        # Written into one tensor: many small ones, each behind a large one that is free again, keep memory in pieces.
+        done, prints = 0, torch.empty(len(bins), _PRINTS, dtype=torch.int64, device=bins.device)
+        for rows, into in zip(bins.split(_ROWS), prints.split(_ROWS), strict=True):
+            into.copy_(_fingerprints(space.encode(rows), seed))
+            done += len(rows)
+            progress(done / len(bins))
+        distinct, merged = distinct_rows(prints)
         first = torch.full((len(distinct),), len(bins), device=bins.device)
         first = first.scatter_reduce(0, merged, torch.arange(len(bins), device=bins.device), "amin")
         later = (first[merged] != torch.arange(len(bins), device=bins.device)).nonzero()[:, 0]
@@ -90,11 +94,11 @@ def _merged(
         seed += 1  # all but impossible: other fingerprints tell them apart
 
 
-def _fingerprints(conditions: Shaped[Tensor, "some d"], seed: int) -> Int64[Tensor, "some 8"]:
-    """Eight random sums of each hypervector's bytes."""
+def _fingerprints(conditions: Shaped[Tensor, "some d"], seed: int) -> Int64[Tensor, "some prints"]:
+    """Random sums of each hypervector's bytes."""
     real = torch.view_as_real(conditions.resolve_conj()).flatten(1) if conditions.is_complex() else conditions
     # Adding zero leaves no -0.0, which equals 0.0 but has other bytes.
     content = (real + 0.0 if real.is_floating_point() else real).contiguous().view(torch.int8)
     generator = torch.Generator().manual_seed(seed)
-    keys = torch.randint(-127, 128, (8, content.shape[1]), dtype=torch.int8, generator=generator)
+    keys = torch.randint(-127, 128, (_PRINTS, content.shape[1]), dtype=torch.int8, generator=generator)
     return dots(content, keys.to(content.device)).to(torch.int64)
