@@ -203,7 +203,8 @@ def print_table(results: Results, console: Console) -> None:
         table.add_column(title, justify="left" if title == "controller" else "right", no_wrap=True)
     for row in results.table:
         cells = {key: _cell(value) for key, value in row.items()} | {"query_us": f"{row['query_us']:.0f}"}
-        cells["time_to_light_s"] = cells["time_to_light_s"][:4]
+        seconds = row["time_to_light_s"]
+        cells["time_to_light_s"] = "-" if seconds is None else f"{seconds:.1f}"
         low, high = cells.pop("success_low"), cells.pop("success_high")
         cells["success_rate"] += f" [{low}, {high}]"
         table.add_row(*cells.values())

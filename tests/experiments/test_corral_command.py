@@ -32,7 +32,10 @@ def test_the_table_has_the_promised_rows_and_columns(finished: tuple[Path, str])
     assert [row["controller"] for row in content["table"]] == content["config"]["controllers"]
     assert all(tuple(row) == COLUMNS for row in content["table"])
     for row in content["table"]:
-        assert re.search(rf"│ {row['controller']} +│ +{row['episodes']} │", printed), row
+        line = re.search(rf"│ {row['controller']} +│ +{row['episodes']} │.*", printed)
+        assert line, row
+        time = row["time_to_light_s"]
+        assert line[0].split("│")[5].strip() == ("-" if time is None else f"{time:.1f}")
     rows = {row["controller"]: row for row in content["table"]}
     assert rows["teacher"]["heldout_agreement"] == rows["hand_written"]["heldout_agreement"] == 1.0
     assert rows["default"]["train_agreement"] >= 0.999
