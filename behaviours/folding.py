@@ -25,17 +25,6 @@ class Products(NamedTuple):
     """The lengths of the conditions."""
 
 
-class Answers(NamedTuple):
-    """What a program says to a batch of conditions."""
-
-    scores: Float64[Tensor, "batch k"]
-    """How strongly it answers with each item: `<unbind(program, c), item> / |item|`."""
-    lengths: Float64[Tensor, "batch"]
-    """The lengths of the noisy results, `|unbind(program, c)|`."""
-    familiarity: Float64[Tensor, "batch"]
-    """The cosine of each condition with the known conditions."""
-
-
 class Folded(nn.Module):
     """A program folded into the items that it can answer with: `<c ⊗ p, item> = <c, p ⊗ item>`.
 
@@ -95,17 +84,11 @@ class Folded(nn.Module):
         noise = _joined(squares[:, :-1], self.square_weights)[:, 0].sqrt()
         return Products(products[:, :-1], products[:, -1], noise, squares[:, -1].to(torch.float64).sqrt())
 
-    def answers(self, products: Products) -> Answers:
-        """What follows from the products."""
-        familiarity = scaled(products.known, products.lengths * self.known_length)
-        return Answers(scaled(products.items, self.item_lengths), products.noise, familiarity)
-
     def recall(self, products: Products, commands: Float64[Tensor, "k m"]) -> Recall:
         """Answer with the best item's row of `commands`."""
-        answers = self.answers(products)
-        match = best(answers.scores, answers.lengths)
-        familiarity = answers.familiarity.to(torch.float32)
-        return Recall(commands[match.index], match.similarity, match.margin, familiarity)
+        match = best(scaled(products.items, self.item_lengths), products.noise)
+        familiarity = scaled(products.known, products.lengths * self.known_length)
+        return Recall(commands[match.index], match.similarity, match.margin, familiarity.to(torch.float32))
 
 
 def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], Float64[Tensor, "digits"]]:

@@ -4,6 +4,8 @@ import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
+from torchvsa.exact import real_parts
+
 
 def first_rows(values: Int64[Tensor, "N"]) -> Int64[Tensor, "k"]:
     """For each of the values 0 .. k-1, all of which occur, the row in which it occurs first."""
@@ -33,7 +35,7 @@ def distinct_rows(rows: Shaped[Tensor, "N c"]) -> tuple[Shaped[Tensor, "k c"], I
 def _comparable(rows: Shaped[Tensor, "N c"]) -> Tensor:
     """Something to tell rows apart by that can be sorted, and fast: one number per row if they are integers."""
     if rows.is_complex():
-        return torch.view_as_real(rows).flatten(1)
+        return real_parts(rows)
     if rows.dtype != torch.int64 or rows.numel() == 0:
         return rows
     key, values = torch.zeros_like(rows[:, 0]), 1

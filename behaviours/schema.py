@@ -136,14 +136,14 @@ class Schema:
         rows = _rows(readings, len(self.sensors), "sensor readings", [s.name for s in self.sensors])
         low, high = self._bounds(self.sensors, rows.device)
         if not torch.compiler.is_compiling():
-            if ((rows >= low) & (rows <= high)).all():
+            inside = (rows >= low) & (rows <= high)
+            if inside.all():
                 return rows, low, high
-            self._refuse(rows, low, high)
+            self._refuse(rows, ~inside & ~rows.isnan())
         return torch.minimum(torch.maximum(rows, low), high), low, high
 
-    def _refuse(self, rows: Tensor, low: Tensor, high: Tensor) -> None:
-        """Raise if a reading is infinite, or beyond what its sensor accepts."""
-        outside = (rows < low) | (rows > high)  # False for NaN
+    def _refuse(self, rows: Tensor, outside: Tensor) -> None:
+        """Raise if a reading is infinite, or `outside` a range and its sensor does not clip."""
         strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
         wrong = rows.isinf() | (outside & strict)
         if wrong.any():

@@ -23,6 +23,11 @@ def is_integer(x: Tensor) -> bool:
     return not (x.is_floating_point() or x.is_complex())
 
 
+def real_parts(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
+    """Complex vectors as real ones with the same products, real and imaginary parts in turns; any other as they are."""
+    return torch.view_as_real(x.resolve_conj()).flatten(-2) if x.is_complex() else x
+
+
 _FEWEST, _FEW = 3, 16
 """An int8 product of many rows is fastest with one item at a time if they are so few, and else, if they are fewer than
 the second number, with the items on its left."""
@@ -38,8 +43,7 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     if a.is_complex() or b.is_complex():
         # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
         wide = torch.promote_types(a.dtype, b.dtype)
-        a, b = (torch.view_as_real(x.to(wide).resolve_conj()).flatten(-2) for x in (a, b))
-        return product(a, b)
+        return product(real_parts(a.to(wide)), real_parts(b.to(wide)))
     int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
     if int8 and a.device.type == "cpu" and a.shape[-1] > 1:
         # The int8 units of the CPU, summing in int32 (they answer nonsense where d = 1).

@@ -7,10 +7,10 @@ import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
-from behaviours.ordered import distinct_rows
+from behaviours.ordered import distinct_rows, first_rows
 from behaviours.progress import Progress, silent
 from behaviours.space import Space
-from torchvsa.exact import dots
+from torchvsa.exact import dots, real_parts
 
 HELD_BYTES = 2**27
 """Conditions that take no more are held as hypervectors."""
@@ -81,9 +81,8 @@ def _merged(
             into.copy_(_fingerprints(space.encode(rows), seed))
             done += len(rows)
             progress(done / len(bins))
-        distinct, merged = distinct_rows(prints)
-        first = torch.full((len(distinct),), len(bins), device=bins.device)
-        first = first.scatter_reduce(0, merged, torch.arange(len(bins), device=bins.device), "amin")
+        _, merged = distinct_rows(prints)
+        first = first_rows(merged)
         later = (first[merged] != torch.arange(len(bins), device=bins.device)).nonzero()[:, 0]
         same = (
             torch.equal(space.encode(bins[some]), space.encode(bins[first[merged[some]]]))
@@ -96,7 +95,7 @@ def _merged(
 
 def _fingerprints(conditions: Shaped[Tensor, "some d"], seed: int) -> Int64[Tensor, "some prints"]:
     """Random sums of each hypervector's bytes."""
-    real = torch.view_as_real(conditions.resolve_conj()).flatten(1) if conditions.is_complex() else conditions
+    real = real_parts(conditions)
     # Adding zero leaves no -0.0, which equals 0.0 but has other bytes.
     content = (real + 0.0 if real.is_floating_point() else real).contiguous().view(torch.int8)
     generator = torch.Generator().manual_seed(seed)

@@ -13,7 +13,7 @@ from behaviours.learning.samples import Samples
 from behaviours.ordered import distinct_rows
 from behaviours.progress import Progress, silent
 from behaviours.space import Space
-from torchvsa.exact import dots, is_integer, norms, signed
+from torchvsa.exact import dots, is_integer, norms, real_parts, signed
 
 _DISTINCT, _BLOCK = 512, 8192
 """Most distinct conditions that are held, and compared with each other, at once; and most samples of them."""
@@ -181,9 +181,7 @@ def _numbers(x: Tensor) -> NDArray[np.float64]:
 
 def _floats(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
     """Real vectors with the same products, in the smallest type that keeps those of integers exact."""
-    x = signed(x)
-    if x.is_complex():
-        return torch.view_as_real(x).flatten(-2)
+    x = real_parts(signed(x))
     if is_integer(x):
         # Codes of one byte are -1, 0 or +1: sums of 2^24 products are exact in float32.
         return x.to(torch.float32 if x.dtype == torch.int8 else torch.float64)

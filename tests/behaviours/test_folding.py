@@ -43,12 +43,14 @@ def test_products_are_exact_for_programs_of_any_size(vsa: str, largest: int) -> 
     items, conditions = made.results(results), made.encode(made.bins(READINGS[:20]))
     folded = Folded(made.vsa, program, program, items)
     assert folded.digital
-    answers = folded.answers(folded.products(conditions))
+    products = folded.products(conditions)
     codes = plain.wide(conditions).real
     noise = codes * program.double().numpy()
     lengths = (plain.wide(items).real ** 2).sum(1) ** 0.5
-    assert_close(answers.scores.numpy(), noise @ plain.wide(items).real.T / lengths, rtol=1e-15, atol=0)
-    assert_close(answers.lengths.numpy(), (noise**2).sum(1) ** 0.5, rtol=1e-15, atol=0)
+    assert_close(
+        (products.items / folded.item_lengths).numpy(), noise @ plain.wide(items).real.T / lengths, rtol=1e-15, atol=0
+    )
+    assert_close(products.noise.numpy(), (noise**2).sum(1) ** 0.5, rtol=1e-15, atol=0)
 
 
 def test_a_changed_program_is_folded_anew() -> None:

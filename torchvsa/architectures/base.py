@@ -106,11 +106,17 @@ class VSA(ABC):
         self.check(x, "x")
         if isinstance(shifts, int):
             return torch.roll(x, shifts, -1)
+        return self._permuted(x, shifts)
+
+    def _permuted(
+        self, x: Shaped[Tensor, "*#batch d"], shifts: Int[Tensor, "*#batch"], added: Shaped[Tensor, "d"] | None = None
+    ) -> Shaped[Tensor, "*#batch d"]:
+        """`permute` with a tensor of shifts; for `added` see `rotated`."""
         if shifts.shape != x.shape[:-1]:
             batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
             x, shifts = x.expand(*batch, self.dim), shifts.expand(batch)
         starts = (-shifts).remainder(self.dim)
-        return rotated(x.reshape(-1, self.dim), starts.reshape(-1)).reshape(x.shape)
+        return rotated(x.reshape(-1, self.dim), starts.reshape(-1), added).reshape(x.shape)
 
     def superpose(
         self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None

@@ -10,7 +10,6 @@ from torchvsa.architectures.base import VSA
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.ties import first_two
 from torchvsa.exact import dots, is_integer, root
-from torchvsa.operators import rotated
 
 
 class MAP(VSA):
@@ -116,8 +115,7 @@ class MAP(VSA):
         """See `VSA.bundle_two_and_permute`."""
         if self.variant != "C" or not self.dtype == a.dtype == b.dtype == torch.int8:
             return super().bundle_two_and_permute(a, b, shifts)
-        starts = (-shifts).remainder(self.dim)
-        return rotated(a.reshape(-1, self.dim), starts.reshape(-1), b).reshape(a.shape)
+        return self._permuted(a, shifts, b)
 
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
