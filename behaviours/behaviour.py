@@ -68,7 +68,7 @@ class Behaviour(nn.Module):
         folded = self._folded()
         # Some rows at a time go all the way to a few products, so that their conditions never leave the cache.
         products = by_blocks(
-            lambda rows: folded.products(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes * 2
+            lambda rows: folded.products(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes
         )
         return folded.recall(products, self.memory.commands)
 

@@ -17,9 +17,8 @@ def fill(like: Tensor) -> Floor:
 
 def copy(like: Tensor) -> Floor:
     """Reading and writing as many bytes as the result has."""
-    sources = [torch.ones_like(like) for _ in range(INPUTS)]
-    out = torch.ones_like(like)
-    return Floor("copy", lambda index: out.copy_(sources[index]))
+    sources, outs = ([torch.ones_like(like) for _ in range(INPUTS)] for _ in range(2))
+    return Floor("copy", lambda index: outs[index].copy_(sources[index]))
 
 
 def read(bytes_read: int, device: str) -> Floor:

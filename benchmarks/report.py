@@ -16,11 +16,10 @@ Row = dict[str, Any]
 
 def print_rows(rows: Sequence[Row], console: Console) -> None:
     """Ratios to the peers, then exponents of growth."""
-    compared = [row for row in rows if "exponent" not in row]
-    if compared:
-        table = Table(title=rows[0]["machine"])
-        for title in ("work", "shape", "threads", "ours", "peer", "theirs", "ratio", "floor", "of floor"):
-            table.add_column(title, justify="left" if title in ("work", "shape", "peer", "floor") else "right")
+    for title, compared in _compared(rows).items():
+        table = Table(title=title)
+        for name in ("work", "shape", "threads", "ours", "peer", "theirs", "ratio", "floor", "of floor"):
+            table.add_column(name, justify="left" if name in ("work", "shape", "peer", "floor") else "right")
         for row in compared:
             table.add_row(*_cells(row))
         console.print(table)
@@ -35,17 +34,27 @@ def print_rows(rows: Sequence[Row], console: Console) -> None:
         console.print(table)
 
 
+def _compared(rows: Sequence[Row]) -> dict[str, list[Row]]:
+    """The rows of each table beside peers, by its title."""
+    tables: dict[str, list[Row]] = {}
+    for row in rows:
+        if "exponent" not in row:
+            title = row["machine"] + (", freed memory kept" if row["memory"] == "kept" else "")
+            tables.setdefault(title, []).append(row)
+    return tables
+
+
 def fill(page: Path, rows: Sequence[Row]) -> None:
     """Write the tables of a page anew, between their marks."""
-    compared = [row for row in rows if "exponent" not in row]
     grown = [row for row in rows if "exponent" in row]
     text = page.read_text()
-    if compared:
+    for title, compared in _compared(rows).items():
         lines = ["| work | size | threads | ours | peer | theirs | ratio | floor | times the floor |"]
         lines.append("|---|---|---:|---:|---|---:|---:|---|---:|")
         for row in compared:
             lines.append(f"| {' | '.join(_cells(row))} |")
-        text = _between(text, "table", [f"{compared[0]['machine']}:", "", *lines])
+        mark = "kept" if compared[0]["memory"] == "kept" else "table"
+        text = _between(text, mark, [f"{title}:", "", *lines])
     if grown:
         lines = ["| work | sizes | time of the largest | exponent | at the top |", "|---|---|---:|---:|---:|"]
         for row in grown:
@@ -85,16 +94,23 @@ def time_of(seconds: float | None) -> str:
 
 
 def draw(rows: Sequence[Row]) -> bytes:
-    """A PNG: how many times faster than each peer, on a logarithmic axis, a dot for each number of threads."""
+    """A PNG: how many times faster than each peer, on a logarithmic axis, a dot for each number of threads.
+
+    Hollow where freed memory is kept.
+    """
     compared = [row for row in rows if row.get("ratio") is not None]
     names = list(dict.fromkeys((row["work"], row["shape"], row["peer"]) for row in compared))
     figure = Figure(figsize=(10, 1.2 + 0.42 * max(len(names), 1)), layout="constrained")
     axes = figure.subplots()
     threads = sorted({row["threads"] for row in compared})
     for count, colour in zip(threads, ("#4477aa", "#ee6677", "#228833"), strict=False):
-        own = [row for row in compared if row["threads"] == count]
-        heights = [names.index((row["work"], row["shape"], row["peer"])) for row in own]
-        axes.plot([row["ratio"] for row in own], heights, "o", color=colour, label=f"{count} thread{'s' * (count > 1)}")
+        for memory, inside in (("returned", colour), ("kept", "white")):
+            own = [row for row in compared if row["threads"] == count and row["memory"] == memory]
+            heights = [names.index((row["work"], row["shape"], row["peer"])) for row in own]
+            label = f"{count} thread{'s' * (count > 1)}{', freed memory kept' * (memory == 'kept')}"
+            if own:
+                ratios = [row["ratio"] for row in own]
+                axes.plot(ratios, heights, "o", color=colour, markerfacecolor=inside, label=label)
     axes.axvline(1, color="0.4", linewidth=1)
     axes.set_xscale("log")
     axes.set_yticks(range(len(names)), [f"{work}, {shape}\nbeside {peer}" for work, shape, peer in names], fontsize=7)

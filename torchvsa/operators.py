@@ -1,9 +1,10 @@
-"""Two operators of our own, for CPUs: each does what one line of PyTorch says, faster.
+"""Operators of our own, for CPUs: each does what a line or two of PyTorch say, faster.
 
 Operators run outside of graphs, gradients and `vmap`, so that they may write in place and call what has no rules for
-those. Where a gradient is wanted, on a GPU and in exported graphs the line of PyTorch stands instead.
+those. Where a gradient is wanted, on a GPU and in exported graphs PyTorch's own lines stand instead.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import torch
@@ -24,24 +25,47 @@ def rotated(
     if torch.compiler.is_exporting() or _differentiated(rows):
         # The gradient of a window would be built on all d windows of each row, and export formats know no windows.
         columns = torch.arange(rows.shape[1], device=rows.device)
-        return _clipped_sum(rows, added).gather(-1, (starts[:, None] + columns) % rows.shape[1])
+        return _superposed(rows, added).gather(-1, (starts[:, None] + columns) % rows.shape[1])
     # A compiler copies many rows element by element, but moves a single one within the steps around it.
-    if rows.shape[0] > (1 if torch.compiler.is_compiling() else _at_once(rows)):
+    if rows.shape[0] > (1 if torch.compiler.is_compiling() else _MANY):
         return torch.ops.torchvsa.rotate(rows, starts, added)
-    return _together(_clipped_sum(rows, added), starts)
+    return _together(_superposed(rows, added), starts)
+
+
+def clipped_sum(table: Shaped[Tensor, "n entries d"], places: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
+    """The sum of the entries `table[i, places[:, i]]`, clipped to [-1, 1]. It must fit the table's own type."""
+    plain = torch.compiler.is_compiling() or table.device.type != "cpu" or _differentiated(table)
+    if plain or places.shape[0] < _MANY:
+        return added_up(entries(table, places)).clamp(-1, 1)
+    return torch.ops.torchvsa.clipped_sum(table, places)
+
+
+def added_up(vectors: Iterator[Shaped[Tensor, "batch d"]]) -> Shaped[Tensor, "batch d"]:
+    """Their sum, in the place of the first."""
+    total = next(vectors)
+    for others in vectors:
+        total += others
+    return total
+
+
+def entries(
+    table: Shaped[Tensor, "n entries d"], places: Int[Tensor, "batch n"]
+) -> Iterator[Shaped[Tensor, "batch d"]]:
+    """`table[i, places[:, i]]` for one i after the other; copied row by row, far faster than by plain indexing."""
+    return (one.index_select(0, column) for one, column in zip(table, places.unbind(1), strict=True))
 
 
 def product(a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
     """`a @ b.T`; many rows of float32 by oneDNN, whose product was 5 to 15 % faster than that of `@` on an AMD CPU."""
     rows = a.reshape(-1, a.shape[-1])
     plain = a.dtype != torch.float32 or a.device.type != "cpu" or torch.compiler.is_exporting() or not _ONEDNN
-    if plain or rows.shape[0] < _MANY or _differentiated(a) or _differentiated(b):
+    if plain or rows.shape[0] < _MANY_FLOATS or _differentiated(a) or _differentiated(b):
         return a @ b.T
     return torch.ops.torchvsa.product(rows, b).reshape(*a.shape[:-1], len(b))
 
 
-_MANY = 16
-"""Rows from which on an operator's own cost is small beside that of the product."""
+_MANY, _MANY_FLOATS = 128, 16
+"""Rows from which on an operator's own cost is small: those of few bytes that are moved, or that are multiplied."""
 _ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_pointwise")
 
 
@@ -54,7 +78,7 @@ def _at_once(rows: Tensor) -> int:
     return max(CACHE_BYTES // (2 * rows.shape[1] * rows.element_size()), 1) if rows.device.type == "cpu" else len(rows)
 
 
-def _clipped_sum(rows: Tensor, added: Tensor | None) -> Tensor:
+def _superposed(rows: Tensor, added: Tensor | None) -> Tensor:
     return rows if added is None else (rows + added).clamp(-1, 1)
 
 
@@ -75,21 +99,34 @@ def _begins(rows: Tensor) -> Tensor:
 
 @torch.library.custom_op("torchvsa::rotate", mutates_args=())
 def _rotate(rows: Tensor, starts: Tensor, added: Tensor | None) -> Tensor:
+    answer = rows.new_empty(rows.shape)
     some = _at_once(rows)
-    if len(rows) <= some:
-        return _together(_clipped_sum(rows, added), starts)
-    twice, answer = rows.new_empty(some, 2, rows.shape[1]), torch.empty_like(rows)
+    twice = rows.new_empty(min(some, len(rows)), 2, rows.shape[1])
     windows, begins = _windows(twice.view(-1), rows.shape[1]), _begins(rows[:some])
     for start in range(0, len(rows), some):
         block = rows[start : start + some]
+        once, again = twice[: len(block)].unbind(1)
         if added is None:
-            twice[: len(block)] = block[:, None]
+            once.copy_(block)
         else:
-            once = twice[: len(block), 0]
             torch.add(block, added, out=once).clamp_(-1, 1)
-            twice[: len(block), 1] = once
+        again.copy_(once)
         places = begins[: len(block)] + starts[start : start + some]
         torch.index_select(windows, 0, places, out=answer[start : start + some])
+    return answer
+
+
+@torch.library.custom_op("torchvsa::clipped_sum", mutates_args=())
+def _clipped_sum(table: Tensor, places: Tensor) -> Tensor:
+    answer = table.new_empty(places.shape[0], table.shape[2])
+    some = _at_once(answer)
+    entry = answer.new_empty(min(some, len(answer)), answer.shape[1])
+    for start in range(0, len(answer), some):
+        sums, columns = answer[start : start + some], places[start : start + some].unbind(1)
+        torch.index_select(table[0], 0, columns[0], out=sums)
+        for one, column in zip(table[1:], columns[1:], strict=True):
+            sums += torch.index_select(one, 0, column, out=entry[: len(sums)])
+        sums.clamp_(-1, 1)
     return answer
 
 
@@ -101,6 +138,11 @@ def _product(a: Tensor, b: Tensor) -> Tensor:
 @_rotate.register_fake
 def _(rows: Tensor, starts: Tensor, added: Tensor | None) -> Tensor:
     return rows.new_empty(rows.shape)
+
+
+@_clipped_sum.register_fake
+def _(table: Tensor, places: Tensor) -> Tensor:
+    return table.new_empty(places.shape[0], table.shape[2])
 
 
 @_product.register_fake
@@ -122,8 +164,20 @@ def _(
 ) -> tuple[Tensor, int]:
     rows, starts = _stacked(info, in_dims[:2], rows, starts)
     if in_dims[2] is not None and added is not None:
-        rows, added = _clipped_sum(rows, added.movedim(in_dims[2], 0)[:, None]), None
+        rows, added = _superposed(rows, added.movedim(in_dims[2], 0)[:, None]), None
     return _rotate(rows.flatten(0, 1), starts.flatten(), added).unflatten(0, (info.batch_size, -1)), 0
+
+
+@_clipped_sum.register_vmap
+def _(info: Any, in_dims: tuple[int | None, ...], table: Tensor, places: Tensor) -> tuple[Tensor, int]:
+    if in_dims[0] is None:
+        places = places.movedim(in_dims[1] or 0, 0)
+    else:
+        # The lists of all mapped tables become one.
+        table, places = _stacked(info, in_dims, table, places)
+        places = places + torch.arange(info.batch_size, device=places.device)[:, None, None] * table.shape[2]
+        table = table.transpose(0, 1).flatten(1, 2)
+    return _clipped_sum(table, places.flatten(0, 1)).unflatten(0, (info.batch_size, -1)), 0
 
 
 @_product.register_vmap

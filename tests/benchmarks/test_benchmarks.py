@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -11,11 +12,12 @@ import pytest
 import torch
 
 from benchmarks.harness import INPUTS, Case, Floor, time_case
+from benchmarks.isolated import MEMORY, isolated
 
 ROOT = Path(__file__).parents[2]
 COLUMNS = {
     "work", "shape", "threads", "ours_s", "peer", "peer_s", "ratio", "floor", "floor_s", "of_floor", "device",
-    "machine",
+    "machine", "memory",
 }  # fmt: skip
 
 
@@ -40,6 +42,8 @@ def test_the_command_measures_every_work(tmp_path: Path) -> None:
         assert row["ratio"] == row["peer_s"] / row["ours_s"]
         assert row["floor"] is None or row["of_floor"] == row["ours_s"] / row["floor_s"]
         assert row["work"] in done.stdout or "…" in done.stdout
+    kept = {row["work"].split(",")[0] for row in compared if row["memory"] == "kept"}
+    assert kept == {"record encoding", "protect", "random hypervectors", "Algorithm 2"}
     for row in rows:
         if "exponent" in row:
             slope = math.log(row["seconds"][1] / row["seconds"][0]) / math.log(row["sizes"][1] / row["sizes"][0])
@@ -51,6 +55,18 @@ def test_the_command_measures_every_work(tmp_path: Path) -> None:
     # What stands around the tables is as it was.
     assert filled.startswith(page.split("<!-- table: begin -->")[0])
     assert filled.endswith(page.split("<!-- growth: end -->")[1])
+
+
+def test_a_work_has_a_process_and_its_memory_of_its_own() -> None:
+    (variable, *_) = MEMORY["kept"]
+    assert variable not in os.environ
+    assert isolated(os.environ.get, variable, memory="kept") == MEMORY["kept"][variable]
+    assert isolated(os.environ.get, variable) is None
+    assert isolated(os.getpid) != os.getpid()
+    assert variable not in os.environ
+    with pytest.raises(ZeroDivisionError):
+        isolated(divmod, 1, 0, memory="kept")
+    assert variable not in os.environ
 
 
 def test_calls_alternate_and_inputs_rotate() -> None:

@@ -12,7 +12,7 @@ from torch.testing import assert_close
 
 from torchvsa import operators
 from torchvsa.exact import dots
-from torchvsa.operators import product, rotated
+from torchvsa.operators import clipped_sum, product, rotated
 
 TYPES = [torch.int8, torch.bool, torch.int32, torch.float32, torch.float64, torch.complex64]
 
@@ -28,6 +28,12 @@ def turned(rows: Tensor, starts: Tensor) -> Tensor:
     return torch.from_numpy(np.stack([np.roll(row, -start) for row, start in pairs]))
 
 
+def in_blocks_of(cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows of as many bytes at a time, by operators even if the rows are few."""
+    monkeypatch.setattr(operators, "CACHE_BYTES", cache)
+    monkeypatch.setattr(operators, "_MANY", 1)
+
+
 def whole(function: Callable[..., Any]) -> Callable[..., Any]:
     return torch.compile(function, fullgraph=True, backend="aot_eager")
 
@@ -39,7 +45,7 @@ def test_rows_are_rotated_wherever_blocks_end(count: int, dtype: torch.dtype, mo
     expected = turned(rows, starts)
     assert torch.equal(rotated(rows, starts), expected)
     assert torch.equal(whole(rotated)(rows, starts), expected)
-    monkeypatch.setattr(operators, "CACHE_BYTES", 2 * 2 * 7 * rows.element_size())
+    in_blocks_of(2 * 2 * 7 * rows.element_size(), monkeypatch)
     assert torch.equal(rotated(rows, starts), expected)
     torch.compiler.reset()
 
@@ -47,7 +53,7 @@ def test_rows_are_rotated_wherever_blocks_end(count: int, dtype: torch.dtype, mo
 @pytest.mark.parametrize("cache", [2**20, 2 * 2 * 7, 1])
 @pytest.mark.parametrize("count", [1, 4, 5])
 def test_rows_are_superposed_before_they_are_rotated(count: int, cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(operators, "CACHE_BYTES", cache)
+    in_blocks_of(cache, monkeypatch)
     codes = torch.randint(-1, 2, (3, count + 1, 7), generator=torch.Generator().manual_seed(count), dtype=torch.int8)
     rows, added = codes[:, 1:], codes[:, 0]
     starts = torch.arange(3 * count).view(3, count) % 7
@@ -69,7 +75,7 @@ def test_no_row_is_rotated() -> None:
 @pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
 @pytest.mark.parametrize("cache", [2**20, 1])
 def test_rotations_are_mapped_and_differentiated(cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(operators, "CACHE_BYTES", cache)
+    in_blocks_of(cache, monkeypatch)
     rows, starts = drawn(3, 4, 5), torch.arange(12).view(3, 4) % 5
     expected = torch.stack([turned(some, first) for some, first in zip(rows, starts, strict=True)])
     assert torch.equal(vmap(rotated)(rows, starts), expected)
@@ -84,6 +90,52 @@ def test_rotations_are_mapped_and_differentiated(cache: int, monkeypatch: pytest
     (rotated(leaf, starts[0]) * rows[1]).sum().backward()
     assert leaf.grad is not None
     assert torch.equal(leaf.grad, turned(rows[1], (-starts[0]) % 5))
+
+
+def summed(table: Tensor, places: Tensor) -> Tensor:
+    """By NumPy, one row after the other."""
+    entries, columns = table.numpy(), range(len(table))
+    return torch.from_numpy(np.stack([entries[columns, row].sum(0).clip(-1, 1) for row in places.numpy()]))
+
+
+@pytest.mark.parametrize("dtype", [torch.int8, torch.float32, torch.float64], ids=str)
+@pytest.mark.parametrize("cache", [2**20, 2 * 2 * 7, 1])
+@pytest.mark.parametrize("lists", [1, 2, 5])
+def test_entries_are_summed_wherever_blocks_end(
+    lists: int, cache: int, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_blocks_of(cache, monkeypatch)
+    table, places = drawn(lists, 4, 7, dtype=dtype), drawn(11, lists, dtype=torch.int64, seed=1) % 4
+    expected = summed(table, places)
+    assert expected.abs().max() == 1
+    assert torch.equal(clipped_sum(table, places).to(expected), expected)
+    assert clipped_sum(table, places).dtype == dtype
+    assert torch.equal(clipped_sum(table, places[:1]).to(expected), expected[:1])
+    assert torch.equal(whole(clipped_sum)(table, places).to(expected), expected)
+    assert clipped_sum(table, places[:0]).shape == (0, 7)
+    torch.compiler.reset()
+
+
+@pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
+@pytest.mark.parametrize("cache", [2**20, 1])
+def test_sums_of_entries_are_mapped_and_differentiated(cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    in_blocks_of(cache, monkeypatch)
+    tables, places = drawn(3, 2, 4, 5), drawn(3, 6, 2, dtype=torch.int64, seed=1) % 4
+    expected = torch.stack([summed(table, some) for table, some in zip(tables, places, strict=True)])
+    assert torch.equal(vmap(clipped_sum)(tables, places), expected)
+    assert torch.equal(vmap(clipped_sum, (1, 0))(tables.transpose(0, 1), places), expected)
+    assert torch.equal(vmap(clipped_sum, (None, 0))(tables[0], places)[2], summed(tables[0], places[2]))
+    assert torch.equal(vmap(clipped_sum, (None, 1))(tables[0], places.transpose(0, 1))[2], summed(tables[0], places[2]))
+    assert torch.equal(vmap(clipped_sum, (0, None))(tables, places[0])[2], summed(tables[2], places[0]))
+    small = tables[0] / 100  # nothing is clipped
+    value, slope = cast(Any, jvp(lambda x: clipped_sum(x, places[0]), (small,), (tables[1] / 100,)))
+    assert_close(value, summed(small, places[0]))
+    assert_close(slope, summed(tables[1] / 100, places[0]))
+    leaf = small.clone().requires_grad_()
+    clipped_sum(leaf, places[0]).sum().backward()
+    asked = torch.stack([places[0][:, i].bincount(minlength=4) for i in range(2)])
+    assert leaf.grad is not None
+    assert torch.equal(leaf.grad, asked[..., None].expand(2, 4, 5).to(leaf.grad))
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])

@@ -1,5 +1,7 @@
 """Records: n values become one hypervector, in every listed combination."""
 
+from typing import Literal
+
 import pytest
 import torch
 from torch import Tensor
@@ -84,6 +86,17 @@ def test_the_batch_does_not_change_a_record(vsa: VSA, values: str, combine: str)
         else:
             assert_close(parts, whole, rtol=1e-5, atol=1e-6)
     assert encode(indices[:0]).shape == (0, vsa.dim)
+
+
+@pytest.mark.parametrize("variant", ["C", "I"])
+@pytest.mark.parametrize("sensors", [127, 128, 300])
+def test_sums_of_many_sensors_do_not_overflow(sensors: int, variant: Literal["C", "I"]) -> None:
+    vsa = torchvsa.MAP(50, variant, torch.int8)
+    encode = Record(vsa, sensors, 2, generator=seeded())
+    encode.table[:, 0] = vsa.random(generator=seeded())  # all of them agree
+    expected = encode.table[0, 0].int() * (1 if variant == "C" else sensors)
+    for batch in (1, 50_000):
+        assert (encode(torch.zeros(batch, sensors, dtype=torch.int64)) == expected).all()
 
 
 @values

@@ -7,9 +7,10 @@ import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
+from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
 from torchvsa.exact import divide, is_integer, norms, paired_dots, signed
-from torchvsa.operators import rotated
+from torchvsa.operators import added_up, entries, rotated
 
 
 class VSA(ABC):
@@ -161,6 +162,18 @@ class VSA(ABC):
     def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """`bundle` of `a` and `b`, element by element of the (broadcast) batch."""
         return self.bundle(torch.stack(torch.broadcast_tensors(a, b), -2))
+
+    def bundle_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """`bundle` of the hypervectors `table[i, places[:, i]]`, where it needs only their sum (see `breaks_ties`)."""
+        # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
+        wide = self.dtype if len(table) < 128 else self.accumulator
+        return by_blocks(
+            lambda rows: self.normalize(added_up(one.to(wide) for one in entries(table, rows))),
+            places,
+            row_bytes=2 * self.row_bytes,
+        )
 
     def bundle_two_and_permute(
         self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]

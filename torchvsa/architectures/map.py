@@ -10,6 +10,7 @@ from torchvsa.architectures.base import VSA
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.ties import first_two
 from torchvsa.exact import dots, is_integer, root
+from torchvsa.operators import clipped_sum
 
 
 class MAP(VSA):
@@ -101,6 +102,15 @@ class MAP(VSA):
         if self.variant == "B" and (voters := first_two(xs, dim, weights)) is not None:
             return self._signs(raw, self.permute(self.bind(*voters), 1))
         return self.normalize(raw)
+
+    def bundle_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """See `VSA.bundle_entries`."""
+        fits = table.dtype == self.dtype and (len(table) < 128 or not self.integer)
+        if self.variant != "C" or not fits:
+            return super().bundle_entries(table, places)
+        return clipped_sum(table, places)
 
     def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """See `VSA.bundle_two`."""

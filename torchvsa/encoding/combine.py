@@ -6,7 +6,6 @@ the entries of each record.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
 from functools import reduce
 from typing import ClassVar
 
@@ -15,12 +14,13 @@ from jaxtyping import Int, Shaped
 from torch import Tensor
 
 from torchvsa.architectures import VSA
+from torchvsa.blocks import by_blocks
+from torchvsa.operators import entries
 
 
-def _entries(table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Iterator[Tensor]:
-    """The entries `[batch, d]` of one sensor after the other; copied row by row, far faster than by plain indexing."""
-    places = torch.where(indices < 0, table.shape[1] - 1, indices)
-    return (entries.index_select(0, column) for entries, column in zip(table, places.unbind(1), strict=True))
+def _places(table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Int[Tensor, "batch n"]:
+    """Where in the table each index stands: -1 at the end."""
+    return torch.where(indices < 0, table.shape[1] - 1, indices)
 
 
 class Combination(ABC):
@@ -46,7 +46,7 @@ class Combination(ABC):
 
     @abstractmethod
     def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """The record of each row of indices into the table (-1, the last entry, is unobserved)."""
+        """The record of each row of indices into the table (-1 is unobserved)."""
 
 
 class Bundled(Combination):
@@ -63,17 +63,15 @@ class Bundled(Combination):
 
     def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Bundle those that were observed."""
-        if self.vsa.breaks_ties:
-            # The voters themselves decide ties, so they are needed side by side: some rows at a time.
-            sensors = torch.arange(len(table), device=table.device)
-            return self.vsa.bundle(table[sensors, indices], weights=(indices >= 0).int())
-        # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
-        wide = self.vsa.dtype if len(table) < 128 else self.vsa.accumulator
-        entries = _entries(table, indices)
-        total = next(entries).to(wide)
-        for others in entries:
-            total += others
-        return self.vsa.normalize(total)
+        if not self.vsa.breaks_ties:
+            return self.vsa.bundle_entries(table, _places(table, indices))
+        # The voters themselves decide ties, so they are needed side by side.
+        sensors = torch.arange(len(table), device=table.device)
+        return by_blocks(
+            lambda rows: self.vsa.bundle(table[sensors, rows], weights=(rows >= 0).int()),
+            indices,
+            row_bytes=len(table) * self.vsa.row_bytes,
+        )
 
 
 class Bound(Combination):
@@ -108,7 +106,11 @@ class Bound(Combination):
 
     def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Bind all."""
-        return reduce(self.vsa.bind, _entries(table, indices))
+        places = _places(table, indices)
+        # Two entries of a row are looked at together.
+        return by_blocks(
+            lambda rows: reduce(self.vsa.bind, entries(table, rows)), places, row_bytes=2 * self.vsa.row_bytes
+        )
 
 
 class SubsetBound(Bound):

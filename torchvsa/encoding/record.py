@@ -9,7 +9,6 @@ from jaxtyping import Int, Shaped
 from torch import Tensor, nn
 
 from torchvsa.architectures import VSA
-from torchvsa.blocks import by_blocks
 from torchvsa.encoding.combine import COMBINATIONS
 from torchvsa.encoding.values import VALUES
 from torchvsa.errors import ShapeError
@@ -69,10 +68,7 @@ class Record(nn.Module):
             raise ShapeError(
                 f"indices must be [batch, {self.sensors}], one column per sensor; got {tuple(indices.shape)}"
             )
-        # Two entries of a row are looked at together, or all of them.
-        together = self.sensors if self.vsa.breaks_ties else 2
-        row_bytes = together * self.table.element_size() * self.vsa.dim
-        return by_blocks(lambda rows: self.combination.join(self.table, rows), indices, row_bytes=row_bytes)
+        return self.combination.join(self.table, indices)
 
 
 def _accepted(name: str, part: Callable[..., Any], **options: int | None) -> dict[str, int]:
