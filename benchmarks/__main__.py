@@ -7,24 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from rich.console import Console
 
 from behaviours.storage import write_atomically
-from benchmarks import cleanup, encoding, growth, imports, learning, protection, random_vectors, recall, rollouts
-from benchmarks.harness import time_case
 from benchmarks.isolated import isolated
-from benchmarks.report import draw, fill, print_rows
+from benchmarks.report import draw, fill, print_rows, wide_console
+from benchmarks.works import GROWTH, WORKS, measure
 
-WORKS = {
-    "encoding": encoding,
-    "cleanup": cleanup,
-    "protection": protection,
-    "random": random_vectors,
-    "learning": learning,
-    "recall": recall,
-    "rollouts": rollouts,
-    "imports": imports,
-}
 KEPT = ("encoding", "protection", "random", "recall")
 """Works whose steps make tensors so large that it matters what becomes of their memory."""
 FOLDER = Path(__file__).parent
@@ -32,8 +20,8 @@ FOLDER = Path(__file__).parent
 
 def main() -> None:
     """Measure, print the table, write `results.json` and draw it into `docs/`."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside peers, in one process.")
-    parser.add_argument("--only", nargs="+", choices=[*WORKS, "growth"], help="these works alone")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside peers.")
+    parser.add_argument("--only", nargs="+", choices=[*WORKS, GROWTH], help="these works alone")
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
     parser.add_argument("--repeats", type=int, default=7, help="timed runs of each call, after one to warm up")
     parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
@@ -41,42 +29,23 @@ def main() -> None:
     parser.add_argument("--out", type=Path, default=FOLDER / "results.json")
     parser.add_argument("--docs", type=Path, default=FOLDER.parent / "docs", help="where benchmarks.md and .png lie")
     options = parser.parse_args()
-    chosen = options.only or [*WORKS, "growth"]
+    chosen = options.only or [*WORKS, GROWTH]
     rows: list[dict[str, Any]] = []
     for name in chosen:
-        rows += isolated(_rows, name, options)
+        rows += isolated(measure, name, options)
     if options.device == "cpu":
         for name in (name for name in chosen if name in KEPT):
-            rows += [{**row, "memory": "kept"} for row in isolated(_rows, name, options, memory="kept")]
+            rows += [{**row, "memory": "kept"} for row in isolated(measure, name, options, memory="kept")]
     machine = torch.cuda.get_device_name() if options.device == "cuda" else f"{_processor()}, torch {torch.__version__}"
     for row in rows:
         row["machine"] = machine
         row.setdefault("memory", "returned")
-    console = _console()
+    console = wide_console()
     print_rows(rows, console)
     write_atomically(options.out, (json.dumps(rows, indent=1) + "\n").encode())
     write_atomically(options.docs / "benchmarks.png", draw(rows))
     fill(options.docs / "benchmarks.md", rows)
     console.print(f"{options.out} and {options.docs / 'benchmarks.md'} hold it")
-
-
-def _rows(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
-    """One work's rows."""
-    if name == "growth":
-        return list(growth.rows(options.device, max(options.threads), small=options.small))
-    rows, console = [], _console()
-    for case in WORKS[name].cases(options.device, options.small):
-        for threads in options.threads:
-            console.print(f"{case.work}, {case.shape}, {threads} threads", style="dim")
-            rows += time_case(case, threads, options.repeats, options.device)
-    return rows
-
-
-def _console() -> Console:
-    console = Console()
-    if not console.is_terminal:
-        console.width = 160  # a file has no width of its own; the table needs this much
-    return console
 
 
 def _processor() -> str:

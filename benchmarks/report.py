@@ -14,6 +14,14 @@ from behaviours.storage import write_atomically
 Row = dict[str, Any]
 
 
+def wide_console() -> Console:
+    """The terminal, or a file as wide as the tables: it has no width of its own."""
+    console = Console()
+    if not console.is_terminal:
+        console.width = 160
+    return console
+
+
 def print_rows(rows: Sequence[Row], console: Console) -> None:
     """Ratios to the peers, then exponents of growth."""
     for title, compared in _compared(rows).items():

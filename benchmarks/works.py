@@ -1,0 +1,32 @@
+"""Which works there are, and how one of them is measured."""
+
+import argparse
+from typing import Any
+
+from benchmarks import cleanup, encoding, growth, imports, learning, protection, random_vectors, recall, rollouts
+from benchmarks.harness import time_case
+from benchmarks.report import wide_console
+
+WORKS = {
+    "encoding": encoding,
+    "cleanup": cleanup,
+    "protection": protection,
+    "random": random_vectors,
+    "learning": learning,
+    "recall": recall,
+    "rollouts": rollouts,
+    "imports": imports,
+}
+GROWTH = "growth"
+
+
+def measure(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
+    """The rows of one work, with the options of the command."""
+    if name == GROWTH:
+        return list(growth.rows(options.device, max(options.threads), small=options.small))
+    rows, console = [], wide_console()
+    for case in WORKS[name].cases(options.device, options.small):
+        for threads in options.threads:
+            console.print(f"{case.work}, {case.shape}, {threads} threads", style="dim")
+            rows += time_case(case, threads, options.repeats, options.device)
+    return rows
