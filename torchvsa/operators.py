@@ -4,8 +4,9 @@ Operators run outside of graphs, gradients and `vmap`, so that they may write in
 those. Where a gradient is wanted, on a GPU and in exported graphs PyTorch's own lines stand instead.
 """
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Callable, Iterator
+from functools import reduce
+from typing import Any, Literal
 
 import torch
 from jaxtyping import Int, Shaped
@@ -32,20 +33,27 @@ def rotated(
     return _together(_superposed(rows, added), starts)
 
 
-def clipped_sum(table: Shaped[Tensor, "n entries d"], places: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-    """The sum of the entries `table[i, places[:, i]]`, clipped to [-1, 1]. It must fit the table's own type."""
+def looked_up(
+    table: Shaped[Tensor, "n entries d"],
+    places: Int[Tensor, "batch n"],
+    how: Literal["clipped sum", "product", "exclusive or"],
+) -> Shaped[Tensor, "batch d"]:
+    """The entries `table[i, places[:, i]]` put together: their sum, clipped to [-1, 1], product or exclusive or.
+
+    In the table's own type, which sums must fit.
+    """
     plain = torch.compiler.is_compiling() or table.device.type != "cpu" or _differentiated(table)
     if plain or places.shape[0] < _MANY:
-        return added_up(entries(table, places)).clamp(-1, 1)
-    return torch.ops.torchvsa.clipped_sum(table, places)
+        whole = reduce(_STEPS[how], entries(table, places))
+        return whole.clamp(-1, 1) if how == "clipped sum" else whole
+    return torch.ops.torchvsa.look_up(table, places, how)
 
 
-def added_up(vectors: Iterator[Shaped[Tensor, "batch d"]]) -> Shaped[Tensor, "batch d"]:
-    """Their sum, in the place of the first."""
-    total = next(vectors)
-    for others in vectors:
-        total += others
-    return total
+_STEPS: dict[str, Callable[[Tensor, Tensor], Tensor]] = {
+    "clipped sum": Tensor.add_,
+    "product": Tensor.mul_,
+    "exclusive or": Tensor.bitwise_xor_,
+}
 
 
 def entries(
@@ -116,17 +124,18 @@ def _rotate(rows: Tensor, starts: Tensor, added: Tensor | None) -> Tensor:
     return answer
 
 
-@torch.library.custom_op("torchvsa::clipped_sum", mutates_args=())
-def _clipped_sum(table: Tensor, places: Tensor) -> Tensor:
+@torch.library.custom_op("torchvsa::look_up", mutates_args=())
+def _look_up(table: Tensor, places: Tensor, how: str) -> Tensor:
     answer = table.new_empty(places.shape[0], table.shape[2])
     some = _at_once(answer)
     entry = answer.new_empty(min(some, len(answer)), answer.shape[1])
     for start in range(0, len(answer), some):
-        sums, columns = answer[start : start + some], places[start : start + some].unbind(1)
-        torch.index_select(table[0], 0, columns[0], out=sums)
+        block, columns = answer[start : start + some], places[start : start + some].unbind(1)
+        torch.index_select(table[0], 0, columns[0], out=block)
         for one, column in zip(table[1:], columns[1:], strict=True):
-            sums += torch.index_select(one, 0, column, out=entry[: len(sums)])
-        sums.clamp_(-1, 1)
+            _STEPS[how](block, torch.index_select(one, 0, column, out=entry[: len(block)]))
+        if how == "clipped sum":
+            block.clamp_(-1, 1)
     return answer
 
 
@@ -140,8 +149,8 @@ def _(rows: Tensor, starts: Tensor, added: Tensor | None) -> Tensor:
     return rows.new_empty(rows.shape)
 
 
-@_clipped_sum.register_fake
-def _(table: Tensor, places: Tensor) -> Tensor:
+@_look_up.register_fake
+def _(table: Tensor, places: Tensor, how: str) -> Tensor:
     return table.new_empty(places.shape[0], table.shape[2])
 
 
@@ -168,16 +177,16 @@ def _(
     return _rotate(rows.flatten(0, 1), starts.flatten(), added).unflatten(0, (info.batch_size, -1)), 0
 
 
-@_clipped_sum.register_vmap
-def _(info: Any, in_dims: tuple[int | None, ...], table: Tensor, places: Tensor) -> tuple[Tensor, int]:
+@_look_up.register_vmap
+def _(info: Any, in_dims: tuple[int | None, ...], table: Tensor, places: Tensor, how: str) -> tuple[Tensor, int]:
     if in_dims[0] is None:
         places = places.movedim(in_dims[1] or 0, 0)
     else:
         # The lists of all mapped tables become one.
-        table, places = _stacked(info, in_dims, table, places)
+        table, places = _stacked(info, in_dims[:2], table, places)
         places = places + torch.arange(info.batch_size, device=places.device)[:, None, None] * table.shape[2]
         table = table.transpose(0, 1).flatten(1, 2)
-    return _clipped_sum(table, places.flatten(0, 1)).unflatten(0, (info.batch_size, -1)), 0
+    return _look_up(table, places.flatten(0, 1), how).unflatten(0, (info.batch_size, -1)), 0
 
 
 @_product.register_vmap

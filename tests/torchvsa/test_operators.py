@@ -1,6 +1,7 @@
 """The operators of our own: what they say is what the line of PyTorch says, wherever that can be said."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
@@ -12,7 +13,7 @@ from torch.testing import assert_close
 
 from torchvsa import operators
 from torchvsa.exact import dots
-from torchvsa.operators import clipped_sum, product, rotated
+from torchvsa.operators import looked_up, product, rotated
 
 TYPES = [torch.int8, torch.bool, torch.int32, torch.float32, torch.float64, torch.complex64]
 
@@ -92,50 +93,70 @@ def test_rotations_are_mapped_and_differentiated(cache: int, monkeypatch: pytest
     assert torch.equal(leaf.grad, turned(rows[1], (-starts[0]) % 5))
 
 
-def summed(table: Tensor, places: Tensor) -> Tensor:
+def together(table: Tensor, places: Tensor, how: str) -> Tensor:
     """By NumPy, one row after the other."""
-    entries, columns = table.numpy(), range(len(table))
-    return torch.from_numpy(np.stack([entries[columns, row].sum(0).clip(-1, 1) for row in places.numpy()]))
+    entries = [table.numpy()[range(len(table)), row] for row in places.numpy()]
+    join: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "clipped sum": lambda some: some.sum(0).clip(-1, 1),
+        "product": lambda some: some.prod(0),
+        "exclusive or": np.bitwise_xor.reduce,
+    }
+    return torch.from_numpy(np.stack([join[how](some) for some in entries]))
 
 
-@pytest.mark.parametrize("dtype", [torch.int8, torch.float32, torch.float64], ids=str)
+@pytest.mark.parametrize(
+    ("how", "dtype"),
+    [
+        *((how, dtype) for how in ("clipped sum", "product") for dtype in (torch.int8, torch.float32, torch.float64)),
+        ("exclusive or", torch.bool),
+    ],
+    ids=str,
+)
 @pytest.mark.parametrize("cache", [2**20, 2 * 2 * 7, 1])
-@pytest.mark.parametrize("lists", [1, 2, 5])
-def test_entries_are_summed_wherever_blocks_end(
-    lists: int, cache: int, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("lists", [1, 2, 4])
+def test_entries_are_put_together_wherever_blocks_end(
+    lists: int, cache: int, how: Any, dtype: torch.dtype, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     in_blocks_of(cache, monkeypatch)
     table, places = drawn(lists, 4, 7, dtype=dtype), drawn(11, lists, dtype=torch.int64, seed=1) % 4
-    expected = summed(table, places)
-    assert expected.abs().max() == 1
-    assert torch.equal(clipped_sum(table, places).to(expected), expected)
-    assert clipped_sum(table, places).dtype == dtype
-    assert torch.equal(clipped_sum(table, places[:1]).to(expected), expected[:1])
-    assert torch.equal(whole(clipped_sum)(table, places).to(expected), expected)
-    assert clipped_sum(table, places[:0]).shape == (0, 7)
+    expected = together(table, places, how).to(dtype)
+    assert expected.unique().numel() > 1
+    assert torch.equal(looked_up(table, places, how), expected)
+    assert torch.equal(whole(looked_up)(table, places, how), expected)
+    assert torch.equal(looked_up(table, places[:1], how), expected[:1])
+    assert looked_up(table, places[:0], how).shape == (0, 7)
     torch.compiler.reset()
 
 
 @pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
 @pytest.mark.parametrize("cache", [2**20, 1])
-def test_sums_of_entries_are_mapped_and_differentiated(cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("how", ["clipped sum", "product"])
+def test_looking_up_is_mapped_and_differentiated(how: Any, cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
     in_blocks_of(cache, monkeypatch)
-    tables, places = drawn(3, 2, 4, 5), drawn(3, 6, 2, dtype=torch.int64, seed=1) % 4
-    expected = torch.stack([summed(table, some) for table, some in zip(tables, places, strict=True)])
-    assert torch.equal(vmap(clipped_sum)(tables, places), expected)
-    assert torch.equal(vmap(clipped_sum, (1, 0))(tables.transpose(0, 1), places), expected)
-    assert torch.equal(vmap(clipped_sum, (None, 0))(tables[0], places)[2], summed(tables[0], places[2]))
-    assert torch.equal(vmap(clipped_sum, (None, 1))(tables[0], places.transpose(0, 1))[2], summed(tables[0], places[2]))
-    assert torch.equal(vmap(clipped_sum, (0, None))(tables, places[0])[2], summed(tables[2], places[0]))
-    small = tables[0] / 100  # nothing is clipped
-    value, slope = cast(Any, jvp(lambda x: clipped_sum(x, places[0]), (small,), (tables[1] / 100,)))
-    assert_close(value, summed(small, places[0]))
-    assert_close(slope, summed(tables[1] / 100, places[0]))
+    tables, places = drawn(3, 3, 4, 5), drawn(3, 6, 3, dtype=torch.int64, seed=1) % 4
+    expected = [together(table, some, how) for table, some in zip(tables, places, strict=True)]
+    look_up = partial(looked_up, how=how)
+    assert torch.equal(vmap(look_up)(tables, places), torch.stack(expected))
+    assert torch.equal(vmap(look_up, (1, 0))(tables.transpose(0, 1), places), torch.stack(expected))
+    alone = together(tables[0], places[2], how)
+    assert torch.equal(vmap(look_up, (None, 0))(tables[0], places)[2], alone)
+    assert torch.equal(vmap(look_up, (None, 1))(tables[0], places.transpose(0, 1))[2], alone)
+    assert torch.equal(vmap(look_up, (0, None))(tables, places[2])[0], alone)
+    small = tables[0] / 10  # nothing is clipped
+    seen = [small[i, column] for i, column in enumerate(places[0].T)]
+    around = torch.stack([torch.ones_like(seen[0])] * 3 if how == "clipped sum" else
+                         [seen[1] * seen[2], seen[0] * seen[2], seen[0] * seen[1]])  # fmt: skip
+    slopes = sum(one * tables[1][i, column] for i, (one, column) in enumerate(zip(around, places[0].T, strict=True)))
+    value, slope = cast(Any, jvp(lambda x: look_up(x, places[0]), (small,), (tables[1],)))
+    assert_close(value, together(small, places[0], how))
+    assert_close(slope, slopes)
     leaf = small.clone().requires_grad_()
-    clipped_sum(leaf, places[0]).sum().backward()
-    asked = torch.stack([places[0][:, i].bincount(minlength=4) for i in range(2)])
+    look_up(leaf, places[0]).sum().backward()
+    asked = torch.zeros_like(leaf)
+    for i, column in enumerate(places[0].T):
+        asked[i].index_add_(0, column, around[i])
     assert leaf.grad is not None
-    assert torch.equal(leaf.grad, asked[..., None].expand(2, 4, 5).to(leaf.grad))
+    assert_close(leaf.grad, asked)
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])

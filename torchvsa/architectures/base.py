@@ -1,6 +1,7 @@
 """What every Vector Symbolic Architecture shares."""
 
 from abc import ABC, abstractmethod
+from functools import reduce
 from typing import ClassVar
 
 import torch
@@ -10,7 +11,7 @@ from torch import Tensor
 from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
 from torchvsa.exact import divide, is_integer, norms, paired_dots, signed
-from torchvsa.operators import added_up, entries, rotated
+from torchvsa.operators import entries, rotated
 
 
 class VSA(ABC):
@@ -170,10 +171,16 @@ class VSA(ABC):
         # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
         wide = self.dtype if len(table) < 128 else self.accumulator
         return by_blocks(
-            lambda rows: self.normalize(added_up(one.to(wide) for one in entries(table, rows))),
+            lambda rows: self.normalize(reduce(torch.add, (one.to(wide) for one in entries(table, rows)))),
             places,
             row_bytes=2 * self.row_bytes,
         )
+
+    def bind_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """The hypervectors `table[i, places[:, i]]`, bound one after the other."""
+        return by_blocks(lambda rows: reduce(self.bind, entries(table, rows)), places, row_bytes=2 * self.row_bytes)
 
     def bundle_two_and_permute(
         self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]

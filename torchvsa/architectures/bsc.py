@@ -1,13 +1,14 @@
 """Binary Spatter Codes."""
 
 import torch
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.ties import first_two
 from torchvsa.exact import norms, signed
+from torchvsa.operators import looked_up
 
 
 class BSC(VSA):
@@ -45,6 +46,12 @@ class BSC(VSA):
         if a.dtype == torch.bool and b.dtype == torch.bool:
             return a ^ b
         return signed(a) * signed(b)
+
+    def bind_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """See `VSA.bind_entries`."""
+        return looked_up(table, places, "exclusive or")
 
     def unbind(
         self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]

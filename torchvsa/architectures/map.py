@@ -10,7 +10,7 @@ from torchvsa.architectures.base import VSA
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.ties import first_two
 from torchvsa.exact import dots, is_integer, root
-from torchvsa.operators import clipped_sum
+from torchvsa.operators import looked_up
 
 
 class MAP(VSA):
@@ -110,7 +110,13 @@ class MAP(VSA):
         fits = table.dtype == self.dtype and (len(table) < 128 or not self.integer)
         if self.variant != "C" or not fits:
             return super().bundle_entries(table, places)
-        return clipped_sum(table, places)
+        return looked_up(table, places, "clipped sum")
+
+    def bind_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """See `VSA.bind_entries`."""
+        return looked_up(table, places, "product")
 
     def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """See `VSA.bundle_two`."""

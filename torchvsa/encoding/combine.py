@@ -6,7 +6,6 @@ the entries of each record.
 """
 
 from abc import ABC, abstractmethod
-from functools import reduce
 from typing import ClassVar
 
 import torch
@@ -15,7 +14,6 @@ from torch import Tensor
 
 from torchvsa.architectures import VSA
 from torchvsa.blocks import by_blocks
-from torchvsa.operators import entries
 
 
 def _places(table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Int[Tensor, "batch n"]:
@@ -106,11 +104,7 @@ class Bound(Combination):
 
     def join(self, table: Shaped[Tensor, "n entries d"], indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Bind all."""
-        places = _places(table, indices)
-        # Two entries of a row are looked at together.
-        return by_blocks(
-            lambda rows: reduce(self.vsa.bind, entries(table, rows)), places, row_bytes=2 * self.vsa.row_bytes
-        )
+        return self.vsa.bind_entries(table, _places(table, indices))
 
 
 class SubsetBound(Bound):
