@@ -11,9 +11,8 @@ from torch import Tensor
 from torch.func import jacrev, jvp, vmap
 from torch.testing import assert_close
 
-from torchvsa import operators
 from torchvsa.exact import dots
-from torchvsa.operators import looked_up, product, rotated
+from torchvsa.operators import common, look_up, looked_up, product, rotated, rotation
 
 TYPES = [torch.int8, torch.bool, torch.int32, torch.float32, torch.float64, torch.complex64]
 
@@ -31,8 +30,9 @@ def turned(rows: Tensor, starts: Tensor) -> Tensor:
 
 def in_blocks_of(cache: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Rows of as many bytes at a time, by operators even if the rows are few."""
-    monkeypatch.setattr(operators, "CACHE_BYTES", cache)
-    monkeypatch.setattr(operators, "_MANY", 1)
+    monkeypatch.setattr(common, "CACHE_BYTES", cache)
+    monkeypatch.setattr(rotation, "MANY", 1)
+    monkeypatch.setattr(look_up, "MANY", 1)
 
 
 def whole(function: Callable[..., Any]) -> Callable[..., Any]:
@@ -135,23 +135,23 @@ def test_looking_up_is_mapped_and_differentiated(how: Any, cache: int, monkeypat
     in_blocks_of(cache, monkeypatch)
     tables, places = drawn(3, 3, 4, 5), drawn(3, 6, 3, dtype=torch.int64, seed=1) % 4
     expected = [together(table, some, how) for table, some in zip(tables, places, strict=True)]
-    look_up = partial(looked_up, how=how)
-    assert torch.equal(vmap(look_up)(tables, places), torch.stack(expected))
-    assert torch.equal(vmap(look_up, (1, 0))(tables.transpose(0, 1), places), torch.stack(expected))
+    put_together = partial(looked_up, how=how)
+    assert torch.equal(vmap(put_together)(tables, places), torch.stack(expected))
+    assert torch.equal(vmap(put_together, (1, 0))(tables.transpose(0, 1), places), torch.stack(expected))
     alone = together(tables[0], places[2], how)
-    assert torch.equal(vmap(look_up, (None, 0))(tables[0], places)[2], alone)
-    assert torch.equal(vmap(look_up, (None, 1))(tables[0], places.transpose(0, 1))[2], alone)
-    assert torch.equal(vmap(look_up, (0, None))(tables, places[2])[0], alone)
+    assert torch.equal(vmap(put_together, (None, 0))(tables[0], places)[2], alone)
+    assert torch.equal(vmap(put_together, (None, 1))(tables[0], places.transpose(0, 1))[2], alone)
+    assert torch.equal(vmap(put_together, (0, None))(tables, places[2])[0], alone)
     small = tables[0] / 10  # nothing is clipped
     seen = [small[i, column] for i, column in enumerate(places[0].T)]
     around = torch.stack([torch.ones_like(seen[0])] * 3 if how == "clipped sum" else
                          [seen[1] * seen[2], seen[0] * seen[2], seen[0] * seen[1]])  # fmt: skip
     slopes = sum(one * tables[1][i, column] for i, (one, column) in enumerate(zip(around, places[0].T, strict=True)))
-    value, slope = cast(Any, jvp(lambda x: look_up(x, places[0]), (small,), (tables[1],)))
+    value, slope = cast(Any, jvp(lambda x: put_together(x, places[0]), (small,), (tables[1],)))
     assert_close(value, together(small, places[0], how))
     assert_close(slope, slopes)
     leaf = small.clone().requires_grad_()
-    look_up(leaf, places[0]).sum().backward()
+    put_together(leaf, places[0]).sum().backward()
     asked = torch.zeros_like(leaf)
     for i, column in enumerate(places[0].T):
         asked[i].index_add_(0, column, around[i])

@@ -1,0 +1,11 @@
+"""Operators of our own, for CPUs: each does what a line or two of PyTorch say, faster.
+
+Operators run outside of graphs, gradients and `vmap`, so that they may write in place and call what has no rules for
+those. Where a gradient is wanted, on a GPU and in exported graphs PyTorch's own lines stand instead.
+"""
+
+from torchvsa.operators.look_up import entries, looked_up
+from torchvsa.operators.matrix import product
+from torchvsa.operators.rotation import rotated
+
+__all__ = ["entries", "looked_up", "product", "rotated"]
