@@ -170,11 +170,12 @@ class VSA(ABC):
         """`bundle` of the hypervectors `table[i, places[:, i]]`, where it needs only their sum (see `breaks_ties`)."""
         # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
         wide = self.dtype if len(table) < 128 else self.accumulator
-        return by_blocks(
-            lambda rows: self.normalize(reduce(torch.add, (one.to(wide) for one in entries(table, rows)))),
-            places,
-            row_bytes=2 * self.row_bytes,
-        )
+
+        def bundled(rows: Tensor) -> Tensor:
+            vectors = entries(table, rows)
+            return self.normalize(reduce(Tensor.add_, vectors, next(vectors).to(wide)))
+
+        return by_blocks(bundled, places, row_bytes=self.dim * (wide.itemsize + self.dtype.itemsize))
 
     def bind_entries(
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
