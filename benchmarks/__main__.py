@@ -11,10 +11,8 @@ import torch
 from behaviours.storage import write_atomically
 from benchmarks.isolated import isolated
 from benchmarks.report import draw, fill, print_rows, wide_console
-from benchmarks.works import GROWTH, WORKS, measure
+from benchmarks.works import GROWTH, KEPT, WORKS, measure
 
-KEPT = ("encoding", "protection", "random", "recall")
-"""Works whose steps make tensors so large that it matters what becomes of their memory."""
 FOLDER = Path(__file__).parent
 
 
@@ -30,16 +28,14 @@ def main() -> None:
     parser.add_argument("--docs", type=Path, default=FOLDER.parent / "docs", help="where benchmarks.md and .png lie")
     options = parser.parse_args()
     chosen = options.only or [*WORKS, GROWTH]
-    rows: list[dict[str, Any]] = []
-    for name in chosen:
-        rows += isolated(measure, name, options)
+    runs = [(name, "returned") for name in chosen]
     if options.device == "cpu":
-        for name in (name for name in chosen if name in KEPT):
-            rows += [{**row, "memory": "kept"} for row in isolated(measure, name, options, memory="kept")]
+        runs += [(name, "kept") for name in chosen if name in KEPT]
     machine = torch.cuda.get_device_name() if options.device == "cuda" else f"{_processor()}, torch {torch.__version__}"
-    for row in rows:
-        row["machine"] = machine
-        row.setdefault("memory", "returned")
+    rows: list[dict[str, Any]] = []
+    for name, memory in runs:
+        measured = isolated(measure, name, options, memory=memory)
+        rows += [{**row, "machine": machine, "memory": memory} for row in measured]
     console = wide_console()
     print_rows(rows, console)
     write_atomically(options.out, (json.dumps(rows, indent=1) + "\n").encode())

@@ -17,6 +17,8 @@ WORKS = {
     "rollouts": rollouts,
     "imports": imports,
 }
+KEPT = ("encoding", "protection", "random", "recall")
+"""Works whose steps make tensors so large that it matters what becomes of their memory."""
 GROWTH = "growth"
 
 

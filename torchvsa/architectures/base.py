@@ -168,14 +168,17 @@ class VSA(ABC):
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
     ) -> Shaped[Tensor, "batch d"]:
         """`bundle` of the hypervectors `table[i, places[:, i]]`, where it needs only their sum (see `breaks_ties`)."""
-        # Sums of fewer than 128 codes of -1, 0 and +1 fit the codes' own type, the fastest to add.
-        wide = self.dtype if len(table) < 128 else self.accumulator
+        wide = self._type_of_sums(len(table))
 
         def bundled(rows: Tensor) -> Tensor:
             vectors = entries(table, rows)
             return self.normalize(reduce(Tensor.add_, vectors, next(vectors).to(wide)))
 
         return by_blocks(bundled, places, row_bytes=self.dim * (wide.itemsize + self.dtype.itemsize))
+
+    def _type_of_sums(self, count: int) -> torch.dtype:
+        """The smallest type that holds sums of so many hypervectors, which is the fastest to add."""
+        return self.dtype if count < 128 else self.accumulator  # integer codes are -1, 0 and +1
 
     def bind_entries(
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]

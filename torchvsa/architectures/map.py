@@ -107,8 +107,7 @@ class MAP(VSA):
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
     ) -> Shaped[Tensor, "batch d"]:
         """See `VSA.bundle_entries`."""
-        fits = table.dtype == self.dtype and (len(table) < 128 or not self.integer)
-        if self.variant != "C" or not fits:
+        if self.variant != "C" or table.dtype != self._type_of_sums(len(table)):
             return super().bundle_entries(table, places)
         return looked_up(table, places, "clipped sum")
 

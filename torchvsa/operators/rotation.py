@@ -21,9 +21,9 @@ def rotated(
         columns = torch.arange(rows.shape[1], device=rows.device)
         return _superposed(rows, added).gather(-1, (starts[:, None] + columns) % rows.shape[1])
     # A compiler copies many rows element by element, but moves a single one within the steps around it.
-    if rows.shape[0] > (1 if torch.compiler.is_compiling() else MANY):
-        return torch.ops.torchvsa.rotate(rows, starts, added)
-    return _together(_superposed(rows, added), starts)
+    if rows.shape[0] < (2 if torch.compiler.is_compiling() else MANY):
+        return _together(_superposed(rows, added), starts)
+    return torch.ops.torchvsa.rotate(rows, starts, added)
 
 
 def _superposed(rows: Tensor, added: Tensor | None) -> Tensor:
