@@ -30,7 +30,7 @@ class Folded(nn.Module):
 
     A batch of conditions is then answered by one matrix product. Where architecture and program are integers and bind
     element by element, the numbers are written in base 256, digits from -128 to 127: products with the int8 conditions
-    are exact, and as fast as the CPU's integer units. The noisy result's length is the root of `c² · p²`.
+    are exact, and as fast as the device's integer units. The noisy result's length is the root of `c² · p²`.
     """
 
     program: Tensor
@@ -61,7 +61,7 @@ class Folded(nn.Module):
         }
         whole = vsa.integer and vsa.elementwise and all(is_integer(x) for x in (program, known, items))
         # How many digits it takes depends on the values, which no graph may look at.
-        self.digital = whole and program.device.type == "cpu" and not torch.compiler.is_compiling()
+        self.digital = whole and not torch.compiler.is_compiling()
         if self.digital:
             votes = torch.cat([signed(tables["rows"]), signed(known)[None]])
             tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64))
@@ -73,8 +73,7 @@ class Folded(nn.Module):
     def products(self, conditions: Shaped[Tensor, "batch d"]) -> Products:
         """The products with encoded and protected conditions: the only part that sees their d elements."""
         codes = signed(conditions)
-        digital = self.digital and codes.dtype == torch.int8 and codes.device.type == "cpu"
-        if not digital or torch.compiler.is_exporting():
+        if not self.digital or codes.dtype != torch.int8 or torch.compiler.is_exporting():
             known = dots(conditions, self.known[None])[:, 0]
             noise = self.vsa.unbound_norm(self.program, conditions)
             return Products(dots(conditions, self.rows), known, noise, norms(conditions))
@@ -98,7 +97,9 @@ def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], 
         low = (x + 128) % 256 - 128
         digits.append(low.to(torch.int8))
         x = (x - low) // 256
-    return torch.stack(digits, 1).flatten(0, 1), 256.0 ** torch.arange(len(digits), dtype=torch.float64)
+    return torch.stack(digits, 1).flatten(0, 1), 256.0 ** torch.arange(
+        len(digits), dtype=torch.float64, device=x.device
+    )
 
 
 def _joined(products: Shaped[Tensor, "batch rows_digits"], weights: Float64[Tensor, "digits"]) -> Tensor:

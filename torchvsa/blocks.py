@@ -8,6 +8,8 @@ from torch import Tensor
 
 CACHE_BYTES = 2**22
 """Fits the second-level cache of common CPUs, where what lies between two steps is read back fast."""
+_GPU_BYTES = 2**28
+"""Enough to keep a GPU busy, which has no such cache, and little beside its memory."""
 
 Answer = TypeVar("Answer", bound=Tensor | tuple[Any, ...])
 
@@ -16,10 +18,13 @@ def by_blocks(work: Callable[..., Answer], *rows: Tensor, row_bytes: int, block_
     """`work(*rows)`, on blocks of rows that take `block_bytes` between steps if one row takes `row_bytes`.
 
     `work` maps tensors `[N, ...]` to one tensor `[N, ...]`, or a named tuple of them (or None), row by row: the answer
-    is the same at any block size. Only a CPU gains from it; a GPU and a compiler get all rows at once.
+    is the same at any block size. A CPU gains speed from it, a GPU memory alone, and has larger blocks; a compiler gets
+    all rows at once.
     """
+    if rows[0].device.type != "cpu":
+        block_bytes = max(block_bytes, _GPU_BYTES)
     count = max(block_bytes // max(row_bytes, 1), 1)
-    if torch.compiler.is_compiling() or rows[0].device.type != "cpu" or len(rows[0]) <= count:
+    if torch.compiler.is_compiling() or len(rows[0]) <= count:
         return work(*rows)
     parts = [work(*some) for some in zip(*(tensor.split(count) for tensor in rows), strict=True)]
     first = parts[0]

@@ -10,7 +10,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from torchvsa.blocks import by_blocks
-from torchvsa.operators import product
+from torchvsa.operators import integer_product, product
 
 
 def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
@@ -28,9 +28,8 @@ def real_parts(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
     return torch.view_as_real(x.resolve_conj()).flatten(-2) if x.is_complex() else x
 
 
-_FEWEST, _FEW = 3, 16
-"""An int8 product of many rows is fastest with one item at a time if they are so few, and else, if they are fewer than
-the second number, with the items on its left."""
+_FEW = 16
+"""Rows up to which it does not pay to square them in a type of their own."""
 
 
 def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
@@ -45,16 +44,9 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         wide = torch.promote_types(a.dtype, b.dtype)
         return product(real_parts(a.to(wide)), real_parts(b.to(wide)))
     int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
-    if int8 and a.device.type == "cpu" and a.shape[-1] > 1:
-        # The int8 units of the CPU, summing in int32 (they answer nonsense where d = 1).
-        rows = a.reshape(-1, a.shape[-1])
-        if len(b) <= _FEWEST and len(rows) > _FEW:
-            products = torch.cat([torch.ops.aten._int_mm(rows, item) for item in b.T.split(1, -1)], -1)
-        elif len(b) < _FEW < len(rows):
-            products = torch.ops.aten._int_mm(b, rows.T).T
-        else:
-            products = torch.ops.aten._int_mm(rows, b.T)
-        return products.reshape(*a.shape[:-1], len(b))
+    if int8 and (a.device.type == "cuda" or (a.device.type == "cpu" and a.shape[-1] > 1)):
+        # Units for int8; those of a CPU answer nonsense where d = 1.
+        return integer_product(a.reshape(-1, a.shape[-1]), b).reshape(*a.shape[:-1], len(b))
     if is_integer(a) or is_integer(b):
         # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
         wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)

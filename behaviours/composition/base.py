@@ -5,12 +5,13 @@ from collections.abc import Mapping
 from typing import Any, cast
 
 import torch
-from jaxtyping import Shaped
+from jaxtyping import Int64, Shaped
 from torch import Tensor, nn
 
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.recall import Recall, asked_once
+from torchvsa.blocks import by_blocks
 
 
 class Policy(nn.Module, ABC):
@@ -37,8 +38,11 @@ class Policy(nn.Module, ABC):
     def forward(self, readings: Any) -> Recall:
         """Commands for readings; NaN commands and speaker -1 where no sensor was observed."""
         bins = self.space.bins(readings)
-        recall = asked_once(lambda rows: self.ask(self.space.encode(rows)), bins)
-        return recall.blank((bins < 0).all(-1))
+        return asked_once(self._answer, bins).blank((bins < 0).all(-1))
+
+    def _answer(self, bins: Int64[Tensor, "batch n"]) -> Recall:
+        # Some rows at a time: the conditions of all need not be held.
+        return by_blocks(lambda rows: self.ask(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes)
 
     @abstractmethod
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:

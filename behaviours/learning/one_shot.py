@@ -86,7 +86,7 @@ class OneShot(Rule):
             # Nothing is forgotten: each condition is added where it first appears.
             added.extend(first_rows(samples.condition))
             stored = samples.condition[added.rows]
-            accepted = torch.zeros(len(samples.condition), dtype=torch.bool)
+            accepted = torch.zeros_like(samples.condition, dtype=torch.bool)
             accepted[added.rows] = True
         else:
             threshold = self.sigmas / space.vsa.dim**0.5 if self.threshold is None else self.threshold
@@ -107,8 +107,8 @@ class OneShot(Rule):
 def _count(rule: str, samples: Samples, accepted: Tensor, stored: int) -> LearningReport:
     """Tell samples apart by whether their condition had been stored before them, and with which result."""
     count = len(accepted)
-    rows = torch.arange(count)
-    first_stored = torch.full((len(samples.conditions),), count)
+    rows = torch.arange(count, device=accepted.device)
+    first_stored = torch.full((len(samples.conditions),), count, device=accepted.device)
     first_stored = first_stored.scatter_reduce(0, samples.condition[accepted], rows[accepted], "amin")
     first = first_stored[samples.condition]
     before = first < rows

@@ -85,7 +85,7 @@ class Sums:
             for block in self._blocks(torch.arange(len(self.samples.condition))):
                 self.rows += [start + row for row in add(block, threshold)]
                 start += len(block)
-        accepted = torch.zeros(len(self.samples.condition), dtype=torch.bool)
+        accepted = torch.zeros_like(self.samples.condition, dtype=torch.bool)
         accepted[self.rows] = True
         return accepted
 
@@ -125,7 +125,7 @@ class Sums:
         products = _numbers(dots(block.conditions, self.state[1:]))[:, 0]
         square = _numbers(dots(self.state[1:], self.state[1:])).item()
         lengths = np.sqrt(gram.diagonal())
-        condition, added, start = block.condition.numpy(), [], 0
+        condition, added, start = block.condition.cpu().numpy(), [], 0
         while start < len(block):
             new = ~_above(threshold, products, square**0.5 * lengths) | (self.empty and not added)
             ahead = new[condition[start:]]

@@ -63,6 +63,19 @@ def test_chunks_change_no_bit(make: Make) -> None:
 
 
 @policies
+def test_many_rows_are_asked_some_at_a_time(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, asked = make(bank(dim=4000)), []
+    ask = made.ask
+    monkeypatch.setattr(made, "ask", lambda conditions: asked.append(len(conditions)) or ask(conditions))
+    readings = random_pairs(1500, seed=2).sensors
+    whole = parts(made(readings))
+    assert sum(asked) == 1500
+    assert max(asked) <= 2**22 // 4000
+    pieces = zip(*(parts(made(rows)) for rows in readings.split(400)), strict=True)
+    assert all(same_bits(torch.cat(piece), part) for piece, part in zip(pieces, whole, strict=True))
+
+
+@policies
 def test_a_copy_answers_alike(make: Make) -> None:
     made = make(bank(dim=500))
     readings = random_pairs(20, seed=2).sensors

@@ -1,5 +1,7 @@
 """Inner products and norms against NumPy's wide integers and floats."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 import torch
@@ -10,6 +12,7 @@ from torch import Tensor
 from torch.testing import assert_close
 
 from torchvsa.exact import divide, dots, norms, paired_dots, root, signed
+from torchvsa.operators.matrix import by_whole_tiles
 
 bounded = settings(deadline=None, derandomize=True, max_examples=60)
 INTEGERS = [torch.int8, torch.int16, torch.int32, torch.int64]
@@ -29,6 +32,18 @@ def test_integer_products_are_exact(data: st.DataObject, a: torch.dtype, b: torc
     assert (paired_dots(x, y[:3]).numpy() == (wide(x) * wide(y[:3])).sum(-1)).all()
     # PyTorch's vectorised root may err in the last bit.
     assert_close(norms(x).numpy(), np.sqrt((wide(x) ** 2).sum(-1)), rtol=4e-16, atol=0)
+
+
+@pytest.mark.parametrize("device", ["cpu", "cuda"])
+def test_whole_tiles_change_no_product(device: str) -> None:
+    if device == "cuda" and not torch.cuda.is_available():
+        pytest.skip("there is no CUDA device")
+    generator = torch.Generator().manual_seed(0)
+    for rows, count, d in product((0, 1, 17, 64), (1, 3, 32, 50), (1, 7, 64, 1000)):
+        x, y = (torch.randint(-128, 128, (size, d), generator=generator, dtype=torch.int8) for size in (rows, count))
+        answer = by_whole_tiles(x.to(device), y.to(device))
+        assert answer.dtype == torch.int32
+        assert (answer.cpu().numpy() == wide(x) @ wide(y).T).all()
 
 
 @pytest.mark.parametrize("shape", [(3, 40), (40,), (0, 40), (2, 2, 40)])

@@ -5,7 +5,7 @@ those. Where a gradient is wanted, on a GPU and in exported graphs PyTorch's own
 """
 
 from torchvsa.operators.look_up import entries, looked_up
-from torchvsa.operators.matrix import product
+from torchvsa.operators.matrix import integer_product, product
 from torchvsa.operators.rotation import rotated
 
-__all__ = ["entries", "looked_up", "product", "rotated"]
+__all__ = ["entries", "integer_product", "looked_up", "product", "rotated"]

@@ -1,0 +1,241 @@
+"""Everything answers on another device as it does on the CPU, and its answers stay there.
+
+A pretended device takes the place of a GPU, which few machines that run tests have; it lives in a process of its own.
+"""
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+import pytest
+import torch
+from robots import random_pairs, space
+from torch import Tensor, nn
+from torch.testing import assert_close
+
+import torchvsa
+from behaviours import (
+    POLICIES,
+    RULES,
+    Behaviour,
+    BehaviourBank,
+    Demonstrations,
+    ErrorDriven,
+    Gradient,
+    OneShot,
+    Policy,
+    Reflex,
+    Rule,
+    Space,
+)
+from torchvsa import ARCHITECTURES, PROTECTIONS, CleanUp, Record, Thresholds
+from torchvsa.blocks import by_blocks
+from torchvsa.encoding import COMBINATIONS, VALUES
+
+SHOWN = random_pairs(40)
+TWICE = Demonstrations(SHOWN.sensors.repeat(2, 1), torch.cat([SHOWN.commands, SHOWN.commands.flip(0)]))
+"""Each condition with two results."""
+
+
+TOLERANCE = 1e-5
+
+
+@pytest.fixture(scope="module")
+def there() -> Iterator[Callable[..., None]]:
+    """`there(check, *arguments)` in a process with the pretended device."""
+    with ProcessPoolExecutor(1, get_context("spawn")) as process:
+        yield lambda check, *arguments: process.submit(_pretend, check, *arguments).result()
+
+
+def _pretend(check: Callable[..., None], *arguments: Any) -> None:
+    import pretended
+
+    pretended.on_a_pretended_device(check, *arguments)
+
+
+def same(work: Callable[..., Any], *arguments: Tensor | nn.Module, exact: bool = True) -> None:
+    """`work` answers alike on both devices, and where its arguments are."""
+    from pretended import brought_back, moved
+
+    here, away = work(*arguments), brought_back(work(*(moved(argument) for argument in arguments)))
+    close(away, brought(here), exact)
+
+
+def close(answer: Any, expected: Any, exact: bool) -> None:
+    """The same numbers in the same type, or nearly so."""
+    tolerance = 0 if exact else TOLERANCE
+    assert_close(answer, expected, atol=tolerance, rtol=tolerance)
+
+
+def brought(answer: Any) -> Any:
+    """A (named) tuple without what it leaves empty; a tensor as it is."""
+    return tuple(brought(part) for part in answer if part is not None) if isinstance(answer, tuple) else answer
+
+
+def seeded(seed: int) -> torch.Generator:
+    return torch.Generator().manual_seed(seed)
+
+
+@pytest.mark.parametrize("rows", [3, 200])
+@pytest.mark.parametrize("name", ARCHITECTURES)
+def test_the_algebra(there: Callable[..., None], name: str, rows: int) -> None:
+    there(check_algebra, name, rows)
+
+
+def check_algebra(name: str, rows: int) -> None:
+    vsa = torchvsa.architecture(name, 100)
+    a, b = (vsa.random(rows, generator=seeded(seed)) for seed in (0, 1))
+    numbers = torch.arange(rows) * 7
+    for verb in (vsa.bind, vsa.unbind, vsa.bundle_two, vsa.similarity, vsa.separate):
+        same(verb, a, b, exact=vsa.integer)
+    same(vsa.permute, a, numbers)
+    same(lambda a: vsa.permute(a, -3), a)
+    same(lambda a, b: vsa.bundle(torch.stack([a, b]), 0), a, b)
+    same(lambda a, w: vsa.bundle(a, weights=w), a, numbers, exact=vsa.integer)
+    same(lambda a, w: vsa.normalize(vsa.superpose(a, weights=w)), a, numbers, exact=vsa.integer)
+    same(lambda a, b, w: vsa.bundle_two_and_permute(a, b[0], w), a, b, numbers, exact=vsa.integer)
+    same(lambda a, b: vsa.unbound_norm(a[0], b), a, b, exact=vsa.integer)
+    same(vsa.positive, a)
+    same(lambda a, b: CleanUp(a)(b), a, b, exact=False)
+    same(lambda a: vsa.random(4, generator=seeded(2), device=a.device), a)
+
+
+def test_blocks_on_it_are_larger(there: Callable[..., None]) -> None:
+    there(check_blocks)
+
+
+def check_blocks() -> None:
+    from pretended import brought_back, moved
+
+    seen: list[int] = []
+
+    def work(rows: Tensor) -> Tensor:
+        seen.append(len(rows))
+        return rows + 1
+
+    answer = by_blocks(work, moved(torch.arange(10)), row_bytes=2**26, block_bytes=1)
+    assert seen == [4, 4, 2]
+    assert brought_back(answer).tolist() == list(range(1, 11))
+
+
+@pytest.mark.parametrize("rows", [3, 200])
+@pytest.mark.parametrize("name", ARCHITECTURES)
+def test_modules(there: Callable[..., None], name: str, rows: int) -> None:
+    there(check_modules, name, rows)
+
+
+def check_modules(name: str, rows: int) -> None:
+    vsa = torchvsa.architecture(name, 100)
+    vectors = vsa.random(rows, generator=seeded(0))
+    for protection in PROTECTIONS.values():
+        protect = protection(vsa)
+        same(lambda protect, x: protect(x), protect, vectors, exact=vsa.integer)
+        same(lambda protect, y: protect.invert(y), protect, protect(vectors), exact=vsa.integer)
+    same(lambda memory, x: memory(x), CleanUp(vectors[:3]), vectors, exact=False)
+    indices = torch.randint(-1, 5, (rows, 3), generator=seeded(1))
+    encoders: list[Any] = [
+        Record(vsa, 3, 5, values, combine, seeded(2))
+        for values in VALUES
+        for combine in COMBINATIONS
+        if vsa.elementwise or combine != "subset"
+    ]
+    if vsa.elementwise:
+        encoders.append(Thresholds(vsa, 3, 5, generator=seeded(2)))
+    for encoder in encoders:
+        same(lambda encode, rows: encode(rows), encoder, indices, exact=vsa.integer)
+
+
+RULES_AND_OPTIONS: list[Rule] = [
+    *(rule() for rule in RULES.values() if rule not in (ErrorDriven, Gradient)),
+    OneShot("similarity"),
+    OneShot("similarity", clip_each_step=True),
+    OneShot(clip_each_step=True, contradictions="majority"),
+    ErrorDriven(passes=3),
+    ErrorDriven(passes=3, average=True, contradictions="latest"),
+    Gradient(passes=3),
+    Gradient(passes=3, sparse=True, held_back=0.2),
+]
+
+
+@pytest.mark.parametrize("name", ARCHITECTURES)
+@pytest.mark.parametrize("rule", RULES_AND_OPTIONS, ids=str)
+def test_learning_and_recall(there: Callable[..., None], rule: Rule, name: str) -> None:
+    if not rule.supports(torchvsa.architecture(name, 8)):
+        pytest.skip(f"{rule.name} does not learn on {name}")
+    there(check_learning, rule, name)
+
+
+def check_learning(rule: Rule, name: str) -> None:
+    from pretended import moved
+
+    here, away = (rule.fit(s, TWICE) for s in spaces(name))
+    alike(here, away, exact=here.space.vsa.integer and rule.counts)
+    alike(here, moved(here), exact=True)
+    alike(here.clipped(), away.clipped(), exact=False)
+    alike(here.trainable(), away.trainable(), exact=False)
+    answers_alike(Reflex(here), Reflex(away))
+    try:
+        here = rule.partial_fit(here, random_pairs(20, seed=1))
+    except ValueError:
+        return  # it cannot go on
+    alike(here, rule.partial_fit(away, random_pairs(20, seed=1)), exact=here.space.vsa.integer and rule.counts)
+
+
+def test_conditions_too_many_to_be_held(there: Callable[..., None]) -> None:
+    there(check_unheld)
+
+
+def check_unheld() -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("behaviours.learning.conditions.HELD_BYTES", 0)
+        alike(*(OneShot("similarity").fit(s, TWICE) for s in spaces("MAP-C")), exact=True)
+
+
+def spaces(name: str) -> list[Space]:
+    """The same codebooks on both devices."""
+    from pretended import NAME
+
+    return [space(100, name).to(device) for device in ("cpu", NAME)]
+
+
+def alike(here: Behaviour, away: Behaviour, exact: bool) -> None:
+    """The same program on another device, with the same report and the same answers."""
+    from pretended import brought_back
+
+    assert here.report == away.report
+    for mine, theirs in ((here.program, away.program), (here.known, away.known)):
+        if exact:
+            assert torch.equal(brought_back(theirs), mine)
+        close(brought_back(theirs), mine, exact=False)
+    answers_alike(here, away)
+    close(brought_back(away.scores(SHOWN.sensors)), here.scores(SHOWN.sensors), exact=False)
+    assert torch.equal(brought_back(away.labels(SHOWN.commands)), here.labels(SHOWN.commands))
+
+
+def answers_alike(here: nn.Module, away: nn.Module) -> None:
+    """The same answers, each where its module is."""
+    from pretended import brought_back
+
+    mine, theirs = here(SHOWN.sensors), brought_back(away(SHOWN.sensors))
+    close(theirs[1:], brought(mine[1:]), exact=False)
+    clear = mine.margin > TOLERANCE  # where two results are as good as equal, either may win
+    assert torch.equal(theirs[0][clear], mine.commands[clear])
+
+
+@pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
+def test_policies_and_banks(
+    there: Callable[..., None], policy: Callable[[BehaviourBank], Policy], tmp_path: Path
+) -> None:
+    there(check_policies, policy, tmp_path / "bank.safetensors")
+
+
+def check_policies(policy: Callable[[BehaviourBank], Policy], path: Path) -> None:
+    banks = [BehaviourBank(s) for s in spaces("MAP-C")]
+    for bank in banks:
+        bank.learn("low", SHOWN.where([row < 20 for row in range(40)]))
+        bank.learn("high", SHOWN.where([row >= 20 for row in range(40)]))
+    answers_alike(*(policy(bank) for bank in banks))
+    loaded = BehaviourBank.load(banks[1].save(path))
+    assert torch.equal(loaded["low"].program, banks[0]["low"].program)
