@@ -11,7 +11,7 @@ import torch
 from behaviours.storage import write_atomically
 from benchmarks.isolated import isolated
 from benchmarks.report import draw, fill, print_rows, wide_console
-from benchmarks.works import GROWTH, KEPT, WORKS, measure
+from benchmarks.works import GROWTH, KEPT, ON_THE_CPU, WORKS, measure
 
 FOLDER = Path(__file__).parent
 
@@ -24,24 +24,29 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=7, help="timed runs of each call, after one to warm up")
     parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     parser.add_argument("--small", action="store_true", help="tiny sizes, to see that all works")
-    parser.add_argument("--out", type=Path, default=FOLDER / "results.json")
+    parser.add_argument("--out", type=Path, help="results.json beside this file, or results_cuda.json")
     parser.add_argument("--docs", type=Path, default=FOLDER.parent / "docs", help="where benchmarks.md and .png lie")
     options = parser.parse_args()
-    chosen = options.only or [*WORKS, GROWTH]
+    on_cpu = options.device == "cpu"
+    if not (on_cpu or torch.cuda.is_available()):
+        parser.error("PyTorch finds no CUDA device here; leave out --device cuda")
+    suffix = "" if on_cpu else f"_{options.device}"
+    out, picture = options.out or FOLDER / f"results{suffix}.json", options.docs / f"benchmarks{suffix}.png"
+    chosen = options.only or [name for name in (*WORKS, GROWTH) if on_cpu or name not in ON_THE_CPU]
     runs = [(name, "returned") for name in chosen]
-    if options.device == "cpu":
+    if on_cpu:
         runs += [(name, "kept") for name in chosen if name in KEPT]
-    machine = torch.cuda.get_device_name() if options.device == "cuda" else f"{_processor()}, torch {torch.__version__}"
+    machine = f"{_processor() if on_cpu else torch.cuda.get_device_name()}, torch {torch.__version__}"
     rows: list[dict[str, Any]] = []
     for name, memory in runs:
         measured = isolated(measure, name, options, memory=memory)
         rows += [{**row, "machine": machine, "memory": memory} for row in measured]
     console = wide_console()
     print_rows(rows, console)
-    write_atomically(options.out, (json.dumps(rows, indent=1) + "\n").encode())
-    write_atomically(options.docs / "benchmarks.png", draw(rows))
+    write_atomically(out, (json.dumps(rows, indent=1) + "\n").encode())
+    write_atomically(picture, draw(rows))
     fill(options.docs / "benchmarks.md", rows)
-    console.print(f"{options.out} and {options.docs / 'benchmarks.md'} hold it")
+    console.print(f"{out}, {picture} and {options.docs / 'benchmarks.md'} hold it")
 
 
 def _processor() -> str:

@@ -46,5 +46,5 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
                 lambda index, clean=clean, queries=queries: clean(queries[index]),
                 peers,
                 check,
-                floors.product(dtype, batch * count * dim, device),
+                floors.product(dtype if device == "cpu" else torch.bfloat16, batch * count * dim, device),
             )

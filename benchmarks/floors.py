@@ -5,8 +5,8 @@ from torch import Tensor
 
 from benchmarks.harness import INPUTS, Floor
 
-_SIDE = 2048
-"""Rows and columns of the matrices whose product shows the machine's rate."""
+_SIDE = {"cpu": 2048, "cuda": 8192}
+"""Rows and columns of the matrices whose product shows a device's rate."""
 
 
 def fill(like: Tensor) -> Floor:
@@ -29,8 +29,8 @@ def read(bytes_read: int, device: str) -> Floor:
 
 def product(dtype: torch.dtype, multiplications: int, device: str) -> Floor:
     """That many multiplications and additions, at the rate of a large square product in the same type."""
-    if dtype == torch.int8:
-        a, b = (torch.ones(_SIDE, _SIDE, dtype=dtype, device=device) for _ in range(2))
-        return Floor("int8 product", lambda _: torch.ops.aten._int_mm(a, b.T), multiplications / _SIDE**3)
-    a, b = (torch.ones(_SIDE, _SIDE, dtype=dtype, device=device) for _ in range(2))
-    return Floor(f"{str(dtype).removeprefix('torch.')} product", lambda _: a @ b.T, multiplications / _SIDE**3)
+    side = _SIDE[device]
+    a, b = (torch.ones(side, side, dtype=dtype, device=device) for _ in range(2))
+    multiply = torch.ops.aten._int_mm if dtype == torch.int8 else torch.mm
+    name = f"{str(dtype).removeprefix('torch.')} product"
+    return Floor(name, lambda _: multiply(a, b.T), multiplications / side**3)

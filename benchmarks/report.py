@@ -1,9 +1,10 @@
 """The table of a benchmark on the terminal, and as a figure."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from matplotlib.figure import Figure
 from rich.console import Console
@@ -22,61 +23,83 @@ def wide_console() -> Console:
     return console
 
 
+@dataclass(frozen=True)
+class _Table:
+    """What is shown on the terminal, and in a page between two marks."""
+
+    mark: str
+    title: str
+    columns: Mapping[str, Literal["left", "right"]]
+    cells: list[list[str]]
+
+
 def print_rows(rows: Sequence[Row], console: Console) -> None:
     """Ratios to the peers, then exponents of growth."""
-    for title, compared in _compared(rows).items():
-        table = Table(title=title)
-        for name in ("work", "shape", "threads", "ours", "peer", "theirs", "ratio", "floor", "of floor"):
-            table.add_column(name, justify="left" if name in ("work", "shape", "peer", "floor") else "right")
-        for row in compared:
-            table.add_row(*_cells(row))
+    for shown in _tables(rows):
+        table = Table(title=shown.title)
+        for name, side in shown.columns.items():
+            table.add_column(name, justify=side)
+        for cells in shown.cells:
+            table.add_row(*cells)
         console.print(table)
-    grown = [row for row in rows if "exponent" in row]
-    if grown:
-        table = Table(title="time = size ^ exponent")
-        for title in ("work", "sizes", "longest", "exponent", "at the top"):
-            table.add_column(title, justify="right")
-        for row in grown:
-            exponents = (f"{row['exponent']:.2f}", f"{row['exponent_at_the_top']:.2f}")
-            table.add_row(row["work"], row["shape"], time_of(row["ours_s"]), *exponents)
-        console.print(table)
-
-
-def _compared(rows: Sequence[Row]) -> dict[str, list[Row]]:
-    """The rows of each table beside peers, by its title."""
-    tables: dict[str, list[Row]] = {}
-    for row in rows:
-        if "exponent" not in row:
-            title = row["machine"] + (", freed memory kept" if row["memory"] == "kept" else "")
-            tables.setdefault(title, []).append(row)
-    return tables
 
 
 def fill(page: Path, rows: Sequence[Row]) -> None:
     """Write the tables of a page anew, between their marks."""
-    grown = [row for row in rows if "exponent" in row]
     text = page.read_text()
-    for title, compared in _compared(rows).items():
-        lines = ["| work | size | threads | ours | peer | theirs | ratio | floor | times the floor |"]
-        lines.append("|---|---|---:|---:|---|---:|---:|---|---:|")
-        for row in compared:
-            lines.append(f"| {' | '.join(_cells(row))} |")
-        mark = "kept" if compared[0]["memory"] == "kept" else "table"
-        text = _between(text, mark, [f"{title}:", "", *lines])
-    if grown:
-        lines = ["| work | sizes | time of the largest | exponent | at the top |", "|---|---|---:|---:|---:|"]
-        for row in grown:
-            exponents = f"{row['exponent']:.2f} | {row['exponent_at_the_top']:.2f}"
-            lines.append(f"| {row['work']} | {row['shape']} | {time_of(row['ours_s'])} | {exponents} |")
-        text = _between(text, "growth", lines)
+    for shown in _tables(rows):
+        rules = ("---" if side == "left" else "---:" for side in shown.columns.values())
+        lines = [f"{shown.title}:", "", f"| {' | '.join(shown.columns)} |", f"|{'|'.join(rules)}|"]
+        text = _between(text, shown.mark, [*lines, *(f"| {' | '.join(cells)} |" for cells in shown.cells)])
     write_atomically(page, text.encode())
 
 
-def _cells(row: Row) -> list[str]:
-    """A row beside a peer, as text."""
+def _tables(rows: Sequence[Row]) -> list[_Table]:
+    """Beside peers, where freed memory is returned and where it is kept, and growth."""
+    grown = [row for row in rows if "exponent" in row]
+    compared = [row for row in rows if "exponent" not in row]
+    # The marks of a page's tables on the CPU bear no name of a device.
+    device = "" if rows[0]["device"] == "cpu" else f", {rows[0]['device']}"
+    tables = []
+    for memory, mark, title in (("returned", "table", ""), ("kept", "kept", ", freed memory kept")):
+        if own := [row for row in compared if row["memory"] == memory]:
+            cells = [_compared_cells(row) for row in own]
+            tables.append(_Table(f"{mark}{device}", f"{own[0]['machine']}{title}", _COMPARED, cells))
+    if grown:
+        title = f"{grown[0]['machine']}, time = size ^ exponent"
+        tables.append(_Table(f"growth{device}", title, _GROWN, [_grown_cells(row) for row in grown]))
+    return tables
+
+
+_COMPARED: dict[str, Literal["left", "right"]] = {
+    "work": "left",
+    "size": "left",
+    "threads": "right",
+    "ours": "right",
+    "peer": "left",
+    "theirs": "right",
+    "ratio": "right",
+    "floor": "left",
+    "times the floor": "right",
+}
+_GROWN: dict[str, Literal["left", "right"]] = {
+    "work": "left",
+    "sizes": "left",
+    "time of the largest": "right",
+    "exponent": "right",
+    "at the top": "right",
+}
+
+
+def _compared_cells(row: Row) -> list[str]:
     ours, theirs = time_of(row["ours_s"]), time_of(row["peer_s"])
     named = [row["work"], row["shape"], str(row["threads"]), ours, row["peer"] or "-", theirs, _times(row["ratio"])]
     return [*named, row["floor"] or "-", _times(row["of_floor"])]
+
+
+def _grown_cells(row: Row) -> list[str]:
+    exponents = (f"{row[name]:.2f}" for name in ("exponent", "exponent_at_the_top"))
+    return [row["work"], row["shape"], time_of(row["ours_s"]), *exponents]
 
 
 def _times(ratio: float | None) -> str:

@@ -19,6 +19,8 @@ WORKS = {
 }
 KEPT = ("encoding", "protection", "random", "recall")
 """Works whose steps make tensors so large that it matters what becomes of their memory."""
+ON_THE_CPU = ("rollouts", "imports")
+"""Works that no other device has a part in."""
 GROWTH = "growth"
 
 

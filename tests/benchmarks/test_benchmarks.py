@@ -13,6 +13,7 @@ import torch
 
 from benchmarks.harness import INPUTS, Case, Floor, time_case
 from benchmarks.isolated import MEMORY, isolated
+from benchmarks.report import fill
 
 ROOT = Path(__file__).parents[2]
 COLUMNS = {
@@ -55,6 +56,24 @@ def test_the_command_measures_every_work(tmp_path: Path) -> None:
     # What stands around the tables is as it was.
     assert filled.startswith(page.split("<!-- table: begin -->")[0])
     assert filled.endswith(page.split("<!-- growth: end -->")[1])
+
+
+def test_a_gpu_has_tables_of_its_own(tmp_path: Path) -> None:
+    page = tmp_path / "benchmarks.md"
+    page.write_text((ROOT / "docs" / "benchmarks.md").read_text())
+    row = {
+        "work": "w", "shape": "s", "threads": 1, "ours_s": 2e-3, "peer": "p", "peer_s": 8e-3, "ratio": 4.0,
+        "floor": "fill", "floor_s": 1e-3, "of_floor": 2.0, "device": "cuda",
+        "machine": "some GPU", "memory": "returned",
+    }  # fmt: skip
+    grown = {**row, "work": "g", "exponent": 1.0, "exponent_at_the_top": 1.5}
+    before = page.read_text()
+    fill(page, [row, grown])
+    filled = page.read_text()
+    assert "some GPU:" in filled
+    assert "| w | s | 1 | 2.00 ms | p | 8.00 ms | 4.0 | fill | 2.0 |" in filled
+    assert "| g | s | 2.00 ms | 1.00 | 1.50 |" in filled
+    assert filled.startswith(before.split("<!-- table, cuda: begin -->")[0])
 
 
 def test_a_work_has_a_process_and_its_memory_of_its_own() -> None:
