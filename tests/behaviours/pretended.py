@@ -39,14 +39,11 @@ class Elsewhere(Tensor):
     def __torch_dispatch__(cls, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         return _run(func, args, kwargs or {})
 
-    def __getitem__(self, key: Any) -> Tensor:
-        # An index from the CPU is welcome on a GPU.
-        return super().__getitem__(trees.tree_map_only(Tensor, lambda t: t.to(NAME), key))
-
     def numpy(self, *_: Any, **__: Any) -> Any:
         raise TypeError("a tensor elsewhere has no NumPy array; copy it to the CPU first")
 
     def tolist(self) -> Any:
+        waited.append("tolist")
         return self.content.tolist()
 
     __array__ = numpy
@@ -63,11 +60,23 @@ _VIEWS: dict[Any, Any] = {aten._conj.default: aten.conj_physical.default, aten._
 """Views that the CPU sees through and a device made in Python does not, and what takes their place."""
 
 
+waited: list[str] = []
+"""Operations that had to wait until values on the device were known, in order."""
+_INDEXING = {aten.index.Tensor, aten.index_put.default, aten.index_put_.default}
+_WAITS = {
+    aten._local_scalar_dense.default, aten.equal.default, aten.nonzero.default, aten.masked_select.default,
+    aten._unique2.default, aten.unique_dim.default,
+}  # fmt: skip
+
+
 def _run(func: Any, args: Any, kwargs: dict[str, Any]) -> Any:
     if func.namespace == "torchvsa":
         # Our operators are made of PyTorch's, which run where their tensors are.
         with Pretended():
             return cast(Any, OPDEFS[func._schema.name])._init_fn(*args, **kwargs)
+    if func in _INDEXING and isinstance(args[0], Elsewhere):
+        # An index from the CPU is welcome on a GPU.
+        args = (args[0], [None if index is None else index.to(NAME) for index in args[1]], *args[2:])
     tensors = [x for x in trees.tree_leaves((args, kwargs)) if isinstance(x, Tensor)]
     there = [x for x in tensors if isinstance(x, Elsewhere)]
     moves = func in (aten._to_copy.default, aten.copy_.default)
@@ -77,6 +86,9 @@ def _run(func: Any, args: Any, kwargs: dict[str, Any]) -> Any:
     if kwargs.get("device") is not None:
         answers_there = torch.device(kwargs["device"]).type == NAME
         kwargs = {**kwargs, "device": "cpu"}
+    masked = func in _INDEXING and any(x.dtype == torch.bool for x in there[1:])
+    if there and (func in _WAITS or masked or (moves and not answers_there)):
+        waited.append(str(func))
     args, kwargs = trees.tree_map_only(Elsewhere, lambda x: x.content, (args, kwargs))
     answer = _VIEWS.get(func, func)(*args, **kwargs)
     if not answers_there:

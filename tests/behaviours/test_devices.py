@@ -55,12 +55,45 @@ def _pretend(check: Callable[..., None], *arguments: Any) -> None:
     pretended.on_a_pretended_device(check, *arguments)
 
 
-def same(work: Callable[..., Any], *arguments: Tensor | nn.Module, exact: bool = True) -> None:
-    """`work` answers alike on both devices, and where its arguments are."""
-    from pretended import brought_back, moved
+def test_it_is_as_strict_as_a_gpu(there: Callable[..., None]) -> None:
+    there(check_strictness)
 
-    here, away = work(*arguments), brought_back(work(*(moved(argument) for argument in arguments)))
-    close(away, brought(here), exact)
+
+def check_strictness() -> None:
+    from pretended import NAME, brought_back, moved, waited
+
+    here = torch.arange(4)
+    away = moved(here)
+    assert away.device.type == torch.ones(1, device=NAME).device.type == NAME
+    mixed: list[Callable[[], Any]] = [lambda: away + here, lambda: here[away], lambda: torch.stack([here, away])]
+    for mix in mixed:
+        with pytest.raises(RuntimeError, match="on the CPU and on another device"):
+            mix()
+    with pytest.raises(TypeError, match="no NumPy array"):
+        away.numpy()
+    with pytest.raises(AssertionError, match="on the CPU"):
+        brought_back(here)
+    away[here[:2]] += 1
+    assert brought_back(away).tolist() == [1, 2, 2, 3]
+    waits: list[Callable[[], Any]] = [away.sum().item, away.cpu, away.tolist, away.unique, lambda: away[away > 1]]
+    for wait in waits:
+        waited.clear()
+        wait()
+        assert len(waited) == 1
+    waited.clear()
+    assert brought_back(away.to(torch.int8).clamp(0, 1)[away]).tolist() == [1, 1, 1, 1]
+    assert waited == []
+
+
+def same(work: Callable[..., Any], *arguments: Tensor | nn.Module, exact: bool = True) -> None:
+    """`work` answers alike on both devices, where its arguments are, and without waiting for the device."""
+    from pretended import brought_back, moved, waited
+
+    copies = [moved(argument) for argument in arguments]
+    waited.clear()
+    away = work(*copies)
+    assert waited == []
+    close(brought_back(away), brought(work(*arguments)), exact)
 
 
 def close(answer: Any, expected: Any, exact: bool) -> None:
@@ -216,9 +249,12 @@ def alike(here: Behaviour, away: Behaviour, exact: bool) -> None:
 
 def answers_alike(here: nn.Module, away: nn.Module) -> None:
     """The same answers, each where its module is."""
-    from pretended import brought_back
+    from pretended import brought_back, waited
 
+    away(SHOWN.sensors)  # the first call may fold the program, and look at its values
+    waited.clear()
     mine, theirs = here(SHOWN.sensors), brought_back(away(SHOWN.sensors))
+    assert waited == []
     close(theirs[1:], brought(mine[1:]), exact=False)
     clear = mine.margin > TOLERANCE  # where two results are as good as equal, either may win
     assert torch.equal(theirs[0][clear], mine.commands[clear])
