@@ -114,7 +114,7 @@ def windows(
     not stand together.
     """
     lags = check_lags(lags)
-    begins = torch.ones(len(episodes), dtype=torch.bool)
+    begins = torch.ones(len(episodes), dtype=torch.bool, device=episodes.device)
     begins[1:] = episodes[1:] != episodes[:-1]
     if int(begins.sum()) != len(episodes.unique()):
         raise ValueError("the rows of an episode must stand together, in the order of its steps")
@@ -134,7 +134,7 @@ def _held(readings: Tensor, begins: Tensor) -> Tensor:
     """Each reading, or the last one of its sensor and episode that was observed."""
     if not len(readings):
         return readings
-    rows = torch.arange(len(readings))[:, None].expand_as(readings)
+    rows = torch.arange(len(readings), device=readings.device)[:, None].expand_as(readings)
     # The first row of an episode counts as observed: what it lacks stays missing, and nothing older comes after it.
     source = torch.where(readings.isnan() & ~begins[:, None], 0, rows).cummax(0).values
     return readings.gather(0, source)

@@ -30,6 +30,8 @@ from behaviours import (
     Rule,
     Space,
 )
+from behaviours.remembering import RememberingSpace, windows
+from behaviours.schema import quantile_edges
 from torchvsa import ARCHITECTURES, PROTECTIONS, CleanUp, Record, Thresholds
 from torchvsa.blocks import by_blocks
 from torchvsa.encoding import COMBINATIONS, VALUES
@@ -85,21 +87,21 @@ def check_strictness() -> None:
     assert waited == []
 
 
-def same(work: Callable[..., Any], *arguments: Tensor | nn.Module, exact: bool = True) -> None:
-    """`work` answers alike on both devices, where its arguments are, and without waiting for the device."""
+def same(work: Callable[..., Any], *arguments: Tensor | nn.Module, exact: bool = True, waits: bool = False) -> None:
+    """`work` answers alike on both devices, where its arguments are, and does not wait for the device unless it may."""
     from pretended import brought_back, moved, waited
 
     copies = [moved(argument) for argument in arguments]
     waited.clear()
     away = work(*copies)
-    assert waited == []
+    assert waits or waited == []
     close(brought_back(away), brought(work(*arguments)), exact)
 
 
 def close(answer: Any, expected: Any, exact: bool) -> None:
     """The same numbers in the same type, or nearly so."""
     tolerance = 0 if exact else TOLERANCE
-    assert_close(answer, expected, atol=tolerance, rtol=tolerance)
+    assert_close(answer, expected, atol=tolerance, rtol=tolerance, equal_nan=True)
 
 
 def brought(answer: Any) -> Any:
@@ -260,6 +262,30 @@ def answers_alike(here: nn.Module, away: nn.Module) -> None:
     assert torch.equal(theirs[0][clear], mine.commands[clear])
 
 
+def test_demonstrations_that_lie_there(there: Callable[..., None]) -> None:
+    there(check_demonstrations)
+
+
+def check_demonstrations() -> None:
+    from pretended import moved
+
+    shown = Demonstrations(moved(TWICE.sensors), moved(TWICE.commands))
+    here, away = spaces("MAP-C")
+    learned = OneShot().fit(here, TWICE)
+    assert torch.equal(OneShot().fit(here, shown).program, learned.program)
+    alike(learned, OneShot().fit(away, shown), exact=True)
+    same(lambda behaviour, readings: behaviour(readings), learned, SHOWN.sensors, exact=False, waits=True)
+    lost = torch.where(torch.rand(SHOWN.sensors.shape, generator=seeded(0)) < 0.3, torch.nan, SHOWN.sensors)
+    episodes = torch.arange(40) // 13
+    for hold in (False, True):
+        same(lambda r, e, hold=hold: windows(r, e, [1, 3], hold), lost, episodes, waits=True)
+    same(lambda readings: quantile_edges(readings, 5), SHOWN.sensors[:, 0], waits=True)
+    assert len(shown.where([row < 5 for row in range(80)])) == 5
+    remembering = RememberingSpace(here, [1])
+    bins = remembering.bins(windows(SHOWN.sensors, episodes, [1]))
+    same(lambda space, rows: space.encode(rows), remembering, bins)
+
+
 @pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())
 def test_policies_and_banks(
     there: Callable[..., None], policy: Callable[[BehaviourBank], Policy], tmp_path: Path
@@ -268,10 +294,14 @@ def test_policies_and_banks(
 
 
 def check_policies(policy: Callable[[BehaviourBank], Policy], path: Path) -> None:
+    from pretended import moved
+
     banks = [BehaviourBank(s) for s in spaces("MAP-C")]
     for bank in banks:
         bank.learn("low", SHOWN.where([row < 20 for row in range(40)]))
         bank.learn("high", SHOWN.where([row >= 20 for row in range(40)]))
-    answers_alike(*(policy(bank) for bank in banks))
+    here, away = (policy(bank) for bank in banks)
+    answers_alike(here, away)
+    answers_alike(here, moved(here))
     loaded = BehaviourBank.load(banks[1].save(path))
     assert torch.equal(loaded["low"].program, banks[0]["low"].program)
