@@ -97,9 +97,8 @@ def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], 
         low = (x + 128) % 256 - 128
         digits.append(low.to(torch.int8))
         x = (x - low) // 256
-    return torch.stack(digits, 1).flatten(0, 1), 256.0 ** torch.arange(
-        len(digits), dtype=torch.float64, device=x.device
-    )
+    weights = 256.0 ** torch.arange(len(digits), dtype=torch.float64, device=x.device)
+    return torch.stack(digits, 1).flatten(0, 1), weights
 
 
 def _joined(products: Shaped[Tensor, "batch rows_digits"], weights: Float64[Tensor, "digits"]) -> Tensor:

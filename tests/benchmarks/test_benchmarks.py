@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 import torch
 
+from benchmarks.__main__ import main
 from benchmarks.harness import INPUTS, Case, Floor, time_case
 from benchmarks.isolated import MEMORY, isolated
 from benchmarks.report import fill
@@ -56,6 +57,16 @@ def test_the_command_measures_every_work(tmp_path: Path) -> None:
     # What stands around the tables is as it was.
     assert filled.startswith(page.split("<!-- table: begin -->")[0])
     assert filled.endswith(page.split("<!-- growth: end -->")[1])
+
+
+def test_a_gpu_that_is_not_there_is_said_at_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "--device", "cuda"])
+    with pytest.raises(SystemExit):
+        main()
+    assert "finds no CUDA device here" in capsys.readouterr().err
 
 
 def test_a_gpu_has_tables_of_its_own(tmp_path: Path) -> None:
