@@ -17,6 +17,13 @@ def corral(folder: Path, *overrides: str, module: str = "experiments.corral") ->
     )
 
 
+def output_of(folder: Path, *overrides: str, module: str = "experiments.corral") -> str:
+    """What such a run prints, which must not fail."""
+    run = corral(folder, *overrides, module=module)
+    assert run.returncode == 0, run.stderr
+    return run.stdout
+
+
 def only(folder: Path, name: str) -> Path:
     """The one file of that name below a folder."""
     (path,) = folder.rglob(name)

@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
-from commands import SMALL, corral, only, results, without_timings
+from commands import SMALL, only, output_of, results, without_timings
 
 from behaviours import BehaviourBank, Demonstrations
 from experiments.corral import COLUMNS
@@ -20,9 +20,7 @@ ROWS = "controllers=[teacher,default,paper,paper_best_bins,bundled,hand_written,
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A small run of most rows: its folder and what the terminal showed."""
     folder = tmp_path_factory.mktemp("run")
-    run = corral(folder, *SMALL, ROWS, "paper_bins=[2]")
-    assert run.returncode == 0, run.stderr
-    return folder, run.stdout
+    return folder, output_of(folder, *SMALL, ROWS, "paper_bins=[2]")
 
 
 @pytest.mark.slow
@@ -82,8 +80,7 @@ def test_the_same_seed_gives_the_same_results_whatever_the_workers(tmp_path: Pat
     contents = []
     for name, options in (("a", ("workers=1", "robots=4")), ("b", ("workers=2", "robots=64"))):
         (tmp_path / name).mkdir()
-        run = corral(tmp_path / name, *SMALL, *options, "controllers=[teacher,default,bundled,random]", "animate=false")
-        assert run.returncode == 0, run.stderr
+        output_of(tmp_path / name, *SMALL, *options, "controllers=[teacher,default,bundled,random]", "animate=false")
         contents.append(without_timings(results(tmp_path / name), "workers", "robots"))
     assert contents[0] == contents[1]
 
@@ -98,14 +95,12 @@ def test_a_sweep_of_two_jobs_is_collected_and_not_run_twice(tmp_path: Path) -> N
         "animate=false",
         *SMALL,
     )
-    run = corral(tmp_path, *sweep)
-    assert run.returncode == 0, run.stderr
+    output_of(tmp_path, *sweep)
     jobs = collect(tmp_path / "sweep")
     assert [job["config"]["vsa"]["dim"] for job in jobs] == [500, 1000]
     times = [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("results.json"))]
-    again = corral(tmp_path, *sweep)
-    assert again.returncode == 0, again.stderr
-    assert again.stdout.count("nothing to do") == 2
+    again = output_of(tmp_path, *sweep)
+    assert again.count("nothing to do") == 2
     assert times == [path.stat().st_mtime_ns for path in sorted(tmp_path.rglob("results.json"))]
 
 
@@ -117,8 +112,7 @@ def test_what_was_learned_is_kept_and_can_be_learned_again(finished: tuple[Path,
     shown = only(folder, "demonstrations.safetensors")
     demonstrations = Demonstrations.load(shown)
     assert len(demonstrations.episodes.unique()) == 6
-    run = corral(tmp_path, *SMALL, f"demonstrations_file={shown}", "controllers=[default]", "animate=false")
-    assert run.returncode == 0, run.stderr
+    output_of(tmp_path, *SMALL, f"demonstrations_file={shown}", "controllers=[default]", "animate=false")
     again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
     assert torch.equal(again["default"].program, bank["default"].program)
     agreed = bank["default"](demonstrations.sensors).commands == demonstrations.commands

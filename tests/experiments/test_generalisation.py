@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from commands import corral as command
-from commands import only, results
+from commands import only, output_of, results
 from generalising import SMALL, Inline, default_settings, inline_workers, quiet, settings
 from rich.console import Console
 
@@ -139,9 +138,7 @@ def test_wrong_settings_are_named(override: str, words: str) -> None:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("generalisation")
-    run = command(folder, *SMALL, module="experiments.generalisation")
-    assert run.returncode == 0, run.stderr
-    return folder, run.stdout
+    return folder, output_of(folder, *SMALL, module="experiments.generalisation")
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:

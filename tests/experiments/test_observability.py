@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
-from commands import corral, only, results
+from commands import corral, only, output_of, results
 
 import sim
 from behaviours import Demonstrations
@@ -162,9 +162,7 @@ def test_what_is_not_there_is_named() -> None:
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A tiny run."""
     folder = tmp_path_factory.mktemp("observability")
-    run = corral(folder, *SMALL, "workers=1", module="experiments.observability")
-    assert run.returncode == 0, run.stderr
-    assert "balanced" in run.stdout
+    assert "balanced" in output_of(folder, *SMALL, "workers=1", module="experiments.observability")
     return folder
 
 
@@ -208,8 +206,7 @@ def test_the_memory_with_the_highest_validation_figure_is_the_one_of_the_rows(fi
 
 
 def test_the_same_seed_gives_the_same_results_in_other_batches(finished: Path, tmp_path: Path) -> None:
-    run = corral(tmp_path, *SMALL, "workers=2", "robots=1", module="experiments.observability")
-    assert run.returncode == 0, run.stderr
+    output_of(tmp_path, *SMALL, "workers=2", "robots=1", module="experiments.observability")
     ours, theirs = results(finished), results(tmp_path)
     assert ours["table"] == theirs["table"]
     assert ours["metrics"] == theirs["metrics"]

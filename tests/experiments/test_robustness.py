@@ -10,7 +10,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
-from commands import corral, only, results
+from commands import only, output_of, results
 from hydra import compose, initialize_config_module
 from omegaconf import OmegaConf
 from rich.console import Console
@@ -238,9 +238,7 @@ TINY = (
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("robustness")
-    run = corral(folder, *TINY, module="experiments.robustness")
-    assert run.returncode == 0, run.stderr
-    return folder, run.stdout
+    return folder, output_of(folder, *TINY, module="experiments.robustness")
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:
