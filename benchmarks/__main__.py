@@ -17,21 +17,24 @@ FOLDER = Path(__file__).parent
 
 
 def main() -> None:
-    """Measure, print the table, write `results.json` and draw it into `docs/`."""
+    """Measure and print the table; a whole run writes `results.json` and draws it into `docs/` too."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside peers.")
-    parser.add_argument("--only", nargs="+", choices=[*WORKS, GROWTH], help="these works alone")
+    parser.add_argument("--only", nargs="+", choices=[*WORKS, GROWTH], help="print these works alone")
     parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
     parser.add_argument("--repeats", type=int, default=7, help="timed runs of each call, after one to warm up")
     parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
-    parser.add_argument("--small", action="store_true", help="tiny sizes, to see that all works")
-    parser.add_argument("--out", type=Path, help="results.json beside this file, or results_cuda.json")
-    parser.add_argument("--docs", type=Path, default=FOLDER.parent / "docs", help="where benchmarks.md and .png lie")
+    parser.add_argument("--small", action="store_true", help="print tiny sizes, to see that all works")
+    parser.add_argument("--out", type=Path, help="write the rows here; a whole run does, into results.json")
+    parser.add_argument("--docs", type=Path, help="fill benchmarks.md here, and draw; a whole run does, in docs/")
     options = parser.parse_args()
     on_cpu = options.device == "cpu"
     if not (on_cpu or torch.cuda.is_available()):
         parser.error("PyTorch finds no CUDA device here; leave out --device cuda")
-    suffix = "" if on_cpu else f"_{options.device}"
-    out, picture = options.out or FOLDER / f"results{suffix}.json", options.docs / f"benchmarks{suffix}.png"
+    suffix, whole = "" if on_cpu else f"_{options.device}", not (options.only or options.small)
+    out = options.out or (FOLDER / f"results{suffix}.json" if whole else None)
+    docs = options.docs or (FOLDER.parent / "docs" if whole else None)
+    if docs and not (docs / "benchmarks.md").is_file():
+        parser.error(f"{docs} has no benchmarks.md, whose tables could be filled")
     chosen = options.only or [name for name in (*WORKS, GROWTH) if on_cpu or name not in ON_THE_CPU]
     runs = [(name, "returned") for name in chosen]
     if on_cpu:
@@ -43,10 +46,13 @@ def main() -> None:
         rows += [{**row, "machine": machine, "memory": memory} for row in measured]
     console = wide_console()
     print_rows(rows, console)
-    write_atomically(out, (json.dumps(rows, indent=1) + "\n").encode())
-    write_atomically(picture, draw(rows))
-    fill(options.docs / "benchmarks.md", rows)
-    console.print(f"{out}, {picture} and {options.docs / 'benchmarks.md'} hold it")
+    if out:
+        write_atomically(out, (json.dumps(rows, indent=1) + "\n").encode())
+        console.print(f"{out} holds the rows")
+    if docs:
+        write_atomically(docs / f"benchmarks{suffix}.png", draw(rows))
+        fill(docs / "benchmarks.md", rows)
+        console.print(f"{docs / 'benchmarks.md'} holds the tables and the figure")
 
 
 def _processor() -> str:

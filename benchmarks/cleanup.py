@@ -6,7 +6,7 @@ import torch
 import torchhd
 
 from benchmarks import floors
-from benchmarks.harness import INPUTS, Case
+from benchmarks.harness import INPUTS, Case, variants
 from benchmarks.peers import hypervectors, plain
 from torchvsa import MAP, CleanUp
 
@@ -36,15 +36,17 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
             clean = CleanUp(items.to(device, dtype))
             queries = [query.to(device, dtype) for query in asked]
 
-            def check(clean=clean, queries=queries, peers=peers) -> None:
-                for peer in peers.values():
-                    assert torch.equal(clean(queries[0]).index, plain(peer(0)))
+            for suffix, call in variants(clean, compiled=device != "cpu").items():
 
-            yield Case(
-                f"clean-up, {str(dtype).removeprefix('torch.')}",
-                f"B={batch} K={count} d={dim}",
-                lambda index, clean=clean, queries=queries: clean(queries[index]),
-                peers,
-                check,
-                floors.product(dtype if device == "cpu" else torch.bfloat16, batch * count * dim, device),
-            )
+                def check(call=call, queries=queries, peers=peers) -> None:
+                    for peer in peers.values():
+                        assert torch.equal(call(queries[0]).index, plain(peer(0)))
+
+                yield Case(
+                    f"clean-up, {str(dtype).removeprefix('torch.')}{suffix}",
+                    f"B={batch} K={count} d={dim}",
+                    lambda index, call=call, queries=queries: call(queries[index]),
+                    peers,
+                    check,
+                    floors.product(dtype if device == "cpu" else torch.bfloat16, batch * count * dim, device),
+                )

@@ -8,7 +8,7 @@ import torchhd
 from torch import Tensor
 
 from benchmarks import floors
-from benchmarks.harness import INPUTS, Case
+from benchmarks.harness import INPUTS, Case, variants
 from benchmarks.peers import hypervectors, plain
 from torchvsa import MAP, Record
 
@@ -25,15 +25,14 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
         # 3 sensors are bound by writing the result, 24 by reading the entries of the table.
         result = encode(rows[0])
         floor = floors.fill(result) if sensors == 3 else floors.read(sensors * result.numel(), device)
-        compiled: Any = torch.compile(encode, fullgraph=True, dynamic=False)
-        for name, call in (("record encoding", encode), ("record encoding, compiled", compiled)):
+        for suffix, call in variants(encode, compiled=True).items():
 
             def check(call=call, rows=rows, peer=peer) -> None:
                 for theirs in (peer.default, peer.tuned):
                     assert torch.equal(call(rows[0]).float(), plain(theirs(rows[0])).clamp(-1, 1))
 
             yield Case(
-                name,
+                f"record encoding{suffix}",
                 f"B={batch} n={sensors} V={levels} d={dim}",
                 lambda index, call=call, rows=rows: call(rows[index]),
                 {

@@ -43,6 +43,11 @@ class Case:
     """Further columns of the row."""
 
 
+def variants(call: Callable[..., Any], compiled: bool) -> dict[str, Callable[..., Any]]:
+    """The call by what is added to its name, and, if it pays, as PyTorch compiles it."""
+    return {"": call} | ({", compiled": torch.compile(call, fullgraph=True, dynamic=False)} if compiled else {})
+
+
 def time_case(case: Case, threads: int, repeats: int, device: str) -> list[dict[str, Any]]:
     """One row for each peer (or one without): medians of `repeats` alternating runs, in seconds a call."""
     before = torch.get_num_threads()

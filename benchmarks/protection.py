@@ -8,7 +8,7 @@ import torchhd
 from torch import Tensor
 
 from benchmarks import floors
-from benchmarks.harness import INPUTS, Case
+from benchmarks.harness import INPUTS, Case, variants
 from benchmarks.peers import hypervectors, plain
 from torchvsa import MAP, SelfShift
 
@@ -24,17 +24,19 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
         protect = SelfShift(vsa, width, seed=1).to(device)
         peer = Peer(protect.h, width)
 
-        def check(protect=protect, peer=peer) -> None:
-            assert torch.equal(protect(inputs[0]).float(), plain(peer(floats[0])))
+        for suffix, call in variants(protect, compiled=device != "cpu").items():
 
-        yield Case(
-            f"protect, {width} width",
-            f"B={batch} d={dim}",
-            lambda index, protect=protect: protect(inputs[index]),
-            {"loop of torchhd.permute": lambda index, peer=peer: peer(floats[index])},
-            check,
-            floors.copy(inputs[0]),
-        )
+            def check(call=call, peer=peer) -> None:
+                assert torch.equal(call(inputs[0]).float(), plain(peer(floats[0])))
+
+            yield Case(
+                f"protect, {width} width{suffix}",
+                f"B={batch} d={dim}",
+                lambda index, call=call: call(inputs[index]),
+                {"loop of torchhd.permute": lambda index, peer=peer: peer(floats[index])},
+                check,
+                floors.copy(inputs[0]),
+            )
 
 
 class Peer:

@@ -32,7 +32,7 @@ from behaviours import (
 )
 from behaviours.remembering import RememberingSpace, windows
 from behaviours.schema import quantile_edges
-from torchvsa import ARCHITECTURES, PROTECTIONS, CleanUp, Record, Thresholds
+from torchvsa import ARCHITECTURES, PROTECTIONS, CleanUp, Record, SelfShift, Thresholds
 from torchvsa.blocks import by_blocks
 from torchvsa.encoding import COMBINATIONS, VALUES
 
@@ -153,6 +153,23 @@ def check_blocks() -> None:
     answer = by_blocks(work, moved(torch.arange(10)), row_bytes=2**26, block_bytes=1)
     assert seen == [4, 4, 2]
     assert brought_back(answer).tolist() == list(range(1, 11))
+
+
+def test_a_graph_rotates_in_one_pass(there: Callable[..., None]) -> None:
+    there(check_graph)
+
+
+def check_graph() -> None:
+    from pretended import brought_back, moved
+
+    vsa = torchvsa.MAP(100, dtype=torch.int8)
+    vectors = vsa.bundle(vsa.random(200, 3, generator=seeded(0)))
+    protect, asked = moved(SelfShift(vsa)), moved(vectors)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(torch.compiler, "is_compiling", lambda: True)
+        patch.delattr("torchvsa.operators.rotation._windows")
+        answer = brought_back(protect(asked))
+    assert torch.equal(answer, SelfShift(vsa)(vectors))
 
 
 @pytest.mark.parametrize("rows", [3, 200])

@@ -69,6 +69,30 @@ def test_a_gpu_that_is_not_there_is_said_at_once(
     assert "finds no CUDA device here" in capsys.readouterr().err
 
 
+def test_a_page_that_is_not_there_is_said_at_once(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "--docs", str(tmp_path)])
+    with pytest.raises(SystemExit):
+        main()
+    assert f"{tmp_path} has no benchmarks.md" in capsys.readouterr().err
+
+
+def test_a_part_is_printed_and_leaves_the_files_of_the_whole(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "docs").mkdir()
+    (tmp_path / "docs" / "benchmarks.md").write_text("as it was")
+    (tmp_path / "benchmarks").mkdir()
+    monkeypatch.setattr("benchmarks.__main__.FOLDER", tmp_path / "benchmarks")
+    monkeypatch.setattr(sys, "argv", ["benchmarks", "--only", "random", "--small", "--repeats", "1", "--threads", "1"])
+    main()
+    assert "torchhd.random" in capsys.readouterr().out
+    files = [path.relative_to(tmp_path) for path in tmp_path.rglob("*") if path.is_file()]
+    assert files == [Path("docs", "benchmarks.md")]
+    assert (tmp_path / "docs" / "benchmarks.md").read_text() == "as it was"
+
+
 def test_a_gpu_has_tables_of_its_own(tmp_path: Path) -> None:
     page = tmp_path / "benchmarks.md"
     page.write_text((ROOT / "docs" / "benchmarks.md").read_text())

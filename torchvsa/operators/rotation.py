@@ -16,12 +16,14 @@ def rotated(
 
     With `added`, of the rows' own integer type, each row is its sum with that, clipped to [-1, 1].
     """
-    if torch.compiler.is_exporting() or differentiated(rows):
-        # The gradient of a window would be built on all d windows of each row, and export formats know no windows.
+    compiling = torch.compiler.is_compiling()
+    if torch.compiler.is_exporting() or differentiated(rows) or (compiling and rows.device.type != "cpu"):
+        # The gradient of a window would be built on all d windows of each row, export formats know no windows, and a
+        # compiler for GPUs makes one pass of this.
         columns = torch.arange(rows.shape[1], device=rows.device)
         return _superposed(rows, added).gather(-1, (starts[:, None] + columns) % rows.shape[1])
-    # A compiler copies many rows element by element, but moves a single one within the steps around it.
-    if rows.shape[0] < (2 if torch.compiler.is_compiling() else MANY):
+    # A compiler for CPUs copies many rows element by element, but moves a single one within the steps around it.
+    if rows.shape[0] < (2 if compiling else MANY):
         return _together(_superposed(rows, added), starts)
     return torch.ops.torchvsa.rotate(rows, starts, added)
 
