@@ -4,13 +4,12 @@ A pretended device takes the place of a GPU, which few machines that run tests h
 """
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import pytest
 import torch
+from devices import another_device
 from robots import random_pairs, space
 from torch import Tensor, nn
 from torch.testing import assert_close
@@ -47,14 +46,8 @@ TOLERANCE = 1e-5
 @pytest.fixture(scope="module")
 def there() -> Iterator[Callable[..., None]]:
     """`there(check, *arguments)` in a process with the pretended device."""
-    with ProcessPoolExecutor(1, get_context("spawn")) as process:
-        yield lambda check, *arguments: process.submit(_pretend, check, *arguments).result()
-
-
-def _pretend(check: Callable[..., None], *arguments: Any) -> None:
-    import pretended
-
-    pretended.on_a_pretended_device(check, *arguments)
+    with another_device() as run:
+        yield run
 
 
 def test_it_is_as_strict_as_a_gpu(there: Callable[..., None]) -> None:

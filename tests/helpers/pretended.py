@@ -1,10 +1,9 @@
 """A device that there is not: its tensors say that they lie on it, and are computed with on the CPU.
 
 What would fail on a GPU fails here too: mixing tensors of two devices, or handing one to NumPy. PyTorch learns of the
-device when this is imported, for good, so that it belongs in a process of its own: see `on_a_pretended_device`.
+device when this is imported, for good, so that it belongs in a process of its own: see `devices`.
 """
 
-from collections.abc import Callable
 from copy import deepcopy
 from typing import Any, cast
 
@@ -58,8 +57,6 @@ class Pretended(TorchDispatchMode):
 
 _VIEWS: dict[Any, Any] = {aten._conj.default: aten.conj_physical.default, aten._neg_view.default: aten.neg.default}
 """Views that the CPU sees through and a device made in Python does not, and what takes their place."""
-
-
 waited: list[str] = []
 """Operations that had to wait until values on the device were known, in order."""
 _INDEXING = {aten.index.Tensor, aten.index_put.default, aten.index_put_.default}
@@ -127,10 +124,3 @@ def brought_back(x: Any) -> Any:
     if not isinstance(x, Elsewhere):
         raise AssertionError("an answer came back on the CPU")
     return x.content
-
-
-def on_a_pretended_device(work: Callable[..., Any], *arguments: Any) -> Any:
-    """`work(*arguments)` with the device at hand."""
-    torch.set_num_threads(1)
-    with Pretended():
-        return work(*arguments)
