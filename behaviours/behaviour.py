@@ -135,7 +135,8 @@ class Behaviour(nn.Module):
     def clipped(self) -> "Behaviour":
         """A copy whose program and known conditions are hypervectors of the architecture, not raw sums.
 
-        Clipping loses the counts: a program of many pairs recalls far fewer of them afterwards.
+        Clipping loses the counts: a program of many pairs recalls far fewer of them afterwards. Integer codes take the
+        nearest of -1, 0 and +1, so that a program of fractions far below 1 (`LeastSquares`) is lost in them.
         """
         vsa = self.space.vsa
         program = vsa.normalize(self.program.detach())

@@ -68,6 +68,15 @@ def one_sensor_decides() -> tuple[Space, Demonstrations]:
     return space(1000, protection="none", values="lookup", combine="thresholds"), Demonstrations(sensors, commands)
 
 
+def test_a_program_of_fractions_is_clipped_to_the_nearest_codes() -> None:
+    shown = random_pairs(60)
+    behaviour = Gradient(passes=30).fit(space(2000, protection=SPREAD), shown)
+    assert behaviour.program.abs().median() < 1
+    clipped = behaviour.clipped()
+    assert clipped.program.dtype == torch.int8
+    assert correct(clipped, shown).mean() > 0.98
+
+
 def test_sparse_programs_are_sparser() -> None:
     made, shown = one_sensor_decides()
 

@@ -63,6 +63,15 @@ def test_a_thousand_int8_voters_do_not_overflow() -> None:
     assert torch.equal(summing.superpose(x[None], weights=torch.tensor([1000])), raw)
 
 
+def test_fractions_become_the_nearest_integer_codes() -> None:
+    vsa = torchvsa.MAP(64, dtype=torch.int8)
+    x = vsa.random(generator=torch.Generator().manual_seed(0))
+    assert torch.equal(vsa.bundle(x.expand(3, 64), weights=torch.tensor([0.7, 0.2, 0.0999])), x)
+    fractions = torch.tensor([-7.0, -0.9, -0.4, 0.0, 0.4, 0.6, 1.2])
+    assert torchvsa.MAP(7, dtype=torch.int8).normalize(fractions).tolist() == [-1, -1, 0, 0, 0, 1, 1]
+    assert torchvsa.MAP(7).normalize(fractions).tolist() == fractions.clamp(-1, 1).tolist()
+
+
 def test_bipolar_atoms_are_fair() -> None:
     x = torchvsa.MAP(4001).random(50, generator=torch.Generator().manual_seed(0))
     assert ((x == 1) | (x == -1)).all()

@@ -84,12 +84,15 @@ class MAP(VSA):
         return bound * key
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """C: clip to [-1, 1], keeping 0. I: the sum itself. B: the sign.
+        """C: clip to [-1, 1], keeping 0; integer codes are the nearest ones. I: the sum itself. B: the sign.
 
         A raw sum no longer knows its voters, so B decides its zeros by the sum's own signs, shifted by one.
         """
         if self.variant == "C":
-            return raw.clamp(-1, 1).to(self.dtype)
+            clipped = raw.clamp(-1, 1)
+            # A cast alone would cut a sum of fractions such as 0.9999999 down to 0.
+            nearest = clipped.round() if self.dtype == torch.int8 and raw.is_floating_point() else clipped
+            return nearest.to(self.dtype)
         if self.variant == "I":
             return raw.to(self.accumulator) if is_integer(raw) else raw
         return self._signs(raw, torch.roll(torch.where(raw >= 0, 1, -1), 1, -1))
@@ -122,7 +125,7 @@ class MAP(VSA):
         if self.variant != "C":
             return super().bundle_two(a, b)
         # Two elements of [-1, 1] add up within the codes' own type.
-        return (a + b).clamp(-1, 1).to(self.dtype)
+        return self.normalize(a + b)
 
     def bundle_two_and_permute(
         self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]
