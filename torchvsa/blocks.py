@@ -14,16 +14,20 @@ _GPU_BYTES = 2**28
 Answer = TypeVar("Answer", bound=Tensor | tuple[Any, ...])
 
 
+def rows_at_once(row_bytes: int, device: torch.device, block_bytes: int = CACHE_BYTES) -> int:
+    """Rows of so many bytes in a block. A CPU gains speed from blocks, a GPU memory alone: there they are larger."""
+    if device.type != "cpu":
+        block_bytes = max(block_bytes, _GPU_BYTES)
+    return max(block_bytes // max(row_bytes, 1), 1)
+
+
 def by_blocks(work: Callable[..., Answer], *rows: Tensor, row_bytes: int, block_bytes: int = CACHE_BYTES) -> Answer:
     """`work(*rows)`, on blocks of rows that take `block_bytes` between steps if one row takes `row_bytes`.
 
     `work` maps tensors `[N, ...]` to one tensor `[N, ...]`, or a named tuple of them (or None), row by row: the answer
-    is the same at any block size. A CPU gains speed from it, a GPU memory alone, and has larger blocks; a compiler gets
-    all rows at once.
+    is the same at any block size. A compiler gets all rows at once.
     """
-    if rows[0].device.type != "cpu":
-        block_bytes = max(block_bytes, _GPU_BYTES)
-    count = max(block_bytes // max(row_bytes, 1), 1)
+    count = rows_at_once(row_bytes, rows[0].device, block_bytes)
     if torch.compiler.is_compiling() or len(rows[0]) <= count:
         return work(*rows)
     parts = [work(*some) for some in zip(*(tensor.split(count) for tensor in rows), strict=True)]

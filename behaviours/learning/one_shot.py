@@ -85,16 +85,12 @@ class OneShot(Rule):
         if self.known == "equality":
             # Nothing is forgotten: each condition is added where it first appears.
             added.extend(first_rows(samples.condition))
-            stored = samples.condition[added.rows]
-            accepted = torch.zeros_like(samples.condition, dtype=torch.bool)
-            accepted[added.rows] = True
         else:
             threshold = self.sigmas / space.vsa.dim**0.5 if self.threshold is None else self.threshold
-            accepted = added.extend_where_dissimilar(threshold)
-            stored = samples.condition[added.rows]
+            added.extend_where_dissimilar(threshold)
         held = torch.arange(0 if before is None else len(before.results), device=samples.result.device)
         results = samples.results[in_order_of_appearance(torch.cat([held, samples.result[added.rows]]))]
-        report = _count(self.name, samples, accepted, len(stored))
+        report = _count(self.name, samples, added.accepted, len(added.rows))
         if self.contradictions != "first":
             report = replace(report, contradicting=int((samples.result != shown.result).sum()))
         if before is not None:

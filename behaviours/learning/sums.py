@@ -63,6 +63,13 @@ class Sums:
         """The sum of their conditions."""
         return self.state[1].clone()
 
+    @property
+    def accepted(self) -> Bool[Tensor, "N"]:
+        """Which samples are in the sums."""
+        accepted = torch.zeros_like(self.samples.condition, dtype=torch.bool)
+        accepted[self.rows] = True
+        return accepted
+
     def extend(self, rows: Int64[Tensor, "N"]) -> None:
         """Add the pairs of these samples."""
         for block in self._blocks(rows):
@@ -74,8 +81,8 @@ class Sums:
                 self._add(block, slice(None))
         self.rows += rows.tolist()
 
-    def extend_where_dissimilar(self, threshold: float) -> Bool[Tensor, "N"]:
-        """Go through the samples in order and add those that `known` does not resemble; says which.
+    def extend_where_dissimilar(self, threshold: float) -> None:
+        """Go through the samples in order and add those that `known` does not resemble.
 
         An empty memory resembles nothing, even where the threshold is negative.
         """
@@ -85,9 +92,6 @@ class Sums:
             for block in self._blocks(torch.arange(len(self.samples.condition))):
                 self.rows += [start + row for row in add(block, threshold)]
                 start += len(block)
-        accepted = torch.zeros_like(self.samples.condition, dtype=torch.bool)
-        accepted[self.rows] = True
-        return accepted
 
     def _blocks(self, rows: Int64[Tensor, "N"]) -> Iterator[_Block]:
         start = 0

@@ -1,7 +1,7 @@
-"""Operators of our own, for CPUs: each does what a line or two of PyTorch say, faster.
+"""Operators of our own: each does what a line or two of PyTorch say, faster.
 
-Operators run outside of graphs, gradients and `vmap`, so that they may write in place and call what has no rules for
-those. Where a gradient is wanted, on a GPU and in exported graphs PyTorch's own lines stand instead.
+They run outside of graphs, gradients and `vmap`, so that they may write in place and call what has no rules for those.
+Where a gradient is wanted, in exported graphs and mostly on a GPU, PyTorch's own lines stand instead.
 """
 
 from torchvsa.operators.look_up import entries, looked_up

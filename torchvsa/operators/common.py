@@ -5,7 +5,7 @@ from typing import Any
 from torch import Tensor
 from torch.autograd import forward_ad
 
-from torchvsa.blocks import CACHE_BYTES
+from torchvsa.blocks import CACHE_BYTES, rows_at_once
 
 MANY = 128
 """Rows from which on an operator that copies them costs little itself."""
@@ -17,8 +17,8 @@ def differentiated(x: Tensor) -> bool:
 
 
 def at_once(rows: Tensor) -> int:
-    """Rows that stay in the cache when each is written twice; a GPU takes all."""
-    return max(CACHE_BYTES // (2 * rows.shape[1] * rows.element_size()), 1) if rows.device.type == "cpu" else len(rows)
+    """Rows of a block in which each is written twice."""
+    return rows_at_once(2 * rows.shape[1] * rows.element_size(), rows.device, CACHE_BYTES)
 
 
 def stacked(info: Any, in_dims: tuple[int | None, ...], *tensors: Tensor) -> list[Tensor]:
