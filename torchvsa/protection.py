@@ -36,6 +36,14 @@ class Protection(nn.Module):
         """The name in `PROTECTIONS` and the options from which it is made again."""
         return {"name": self.name}
 
+    @staticmethod
+    def layout(vsa: VSA) -> dict[str, tuple[torch.dtype, tuple]]:
+        """The types and shapes of its tensors, found without making it."""
+        return {}
+
+    def check(self) -> None:
+        """Raise `ValueError` naming the tensor if one does not hold codes of the architecture."""
+
 
 class Unprotected(Protection):
     """No protection: similar conditions stay similar, so that a program can generalise between them."""
@@ -118,6 +126,15 @@ class SelfShift(Protection):
         columns = torch.cat([torch.ones(1, vsa.dim, dtype=torch.int64), digits])
         self.register_buffer("columns", columns.to(torch.int8), persistent=False)
         self.register_buffer("places", places, persistent=False)
+
+    @staticmethod
+    def layout(vsa: VSA) -> dict[str, tuple[torch.dtype, tuple]]:
+        """See `Protection.layout`."""
+        return {"h": (vsa.dtype, (vsa.dim,))}
+
+    def check(self) -> None:
+        """See `Protection.check`."""
+        self.vsa.check_codes(self.h, "h")
 
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""

@@ -216,3 +216,13 @@ class VSA(ABC):
         """Raise `ShapeError` unless `x` holds hypervectors of this dimension."""
         if x.dim() == 0 or x.shape[-1] != self.dim:
             raise ShapeError(f"{argument} must end in d = {self.dim} elements; got shape {tuple(x.shape)}")
+
+    def check_codes(self, x: Tensor, what: str) -> None:
+        """Raise `ValueError` unless `x` holds hypervectors as `random` draws them, or parts of them put together."""
+        self.check(x, what)
+        if x.dtype != self.dtype or not self._are_codes(x):
+            raise ValueError(f"{what} must hold codes of {self}; it holds other values, or another type ({x.dtype})")
+
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        """Whether the elements are such as a hypervector can have."""
+        return bool(x.isfinite().all())

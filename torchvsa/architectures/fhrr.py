@@ -56,6 +56,9 @@ class FHRR(VSA):
         """Scale every element to length 1; zero stays zero."""
         return divide(raw, raw.abs())
 
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        return bool(((x.abs() - 1).abs() < 1e-3).all())
+
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:

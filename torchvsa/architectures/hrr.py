@@ -63,6 +63,10 @@ class HRR(VSA):
         """Scale to length 1; zero stays zero."""
         return divide(raw, norms(raw)[..., None].to(raw.dtype))
 
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        # Ten standard deviations: no element of a drawn hypervector is ever so far from 0.
+        return bool((x.abs() <= 10 / self.dim**0.5).all())
+
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:

@@ -138,6 +138,9 @@ class MAP(VSA):
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
 
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        return bool((x.abs() <= 1).all() if self.atoms == "uniform" else ((x == 1) | (x == -1)).all())
+
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:

@@ -73,6 +73,21 @@ class Thresholds(nn.Module):
         self.register_buffer("threshold", torch.where(spare, threshold[0], threshold))
         self.register_buffer("above", torch.where(spare, above[0], above))
 
+    @staticmethod
+    def layout(vsa: VSA, sensors: int, subset: int | None = None) -> dict[str, tuple[torch.dtype, tuple]]:
+        """The types and shapes of the tensors of such an encoder, found without making it."""
+        shape = min(subset or sensors, sensors), vsa.dim
+        layout = {"start": (vsa.dtype, (vsa.dim,)), "sensor": (torch.int64, shape), "threshold": (torch.int64, shape)}
+        return layout | {"above": (torch.bool, shape)}
+
+    def check(self) -> None:
+        """Raise `ValueError` naming the tensor if one asks about what is not there."""
+        self.vsa.check_codes(self.start, "start")
+        for name, end in (("sensor", self.sensors), ("threshold", self.levels)):
+            tensor = getattr(self, name)
+            if not ((tensor >= 0) & (tensor < end)).all():
+                raise ValueError(f"{name} must hold numbers in [0, {end})")
+
     def forward(self, indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """Encode each row of indices in `[-1, levels)`.
 
