@@ -66,7 +66,7 @@ class Bundled(Combination):
         # The voters themselves decide ties, so they are needed side by side.
         sensors = torch.arange(len(table), device=table.device)
         return by_blocks(
-            lambda rows: self.vsa.bundle(table[sensors, rows], weights=(rows >= 0).int()),
+            lambda rows: self.vsa.bundle(table[sensors, rows], weights=rows >= 0),
             indices,
             row_bytes=len(table) * self.vsa.row_bytes,
         )
