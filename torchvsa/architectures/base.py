@@ -13,7 +13,7 @@ from torchvsa._checks import INTEGERS, whole_number
 from torchvsa.architectures.sums import check_weights, integer_sum, stacked, weighted
 from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
-from torchvsa.exact import divide, is_integer, norms, paired_dots, signed
+from torchvsa.exact import cosines, is_integer, norms, signed
 from torchvsa.operators import entries, rotated
 
 Summands = Shaped[Tensor, "..."] | Sequence[Shaped[Tensor, "..."]]
@@ -211,10 +211,13 @@ class VSA(ABC):
         return self.permute(self.bundle_two(a, b), shifts)
 
     def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
-        """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
+        """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything.
+
+        It does not depend on their lengths, however large or small. NaN where an element is NaN or infinite.
+        """
         self.check(a, "a")
         self.check(b, "b")
-        return divide(paired_dots(a, b), norms(a) * norms(b)).to(torch.float32)
+        return cosines(a, b).to(torch.float32)
 
     def positive(self, x: Shaped[Tensor, "*batch d"]) -> Bool[Tensor, "*batch d"]:
         """The elements that count as > 0, from which a self-derived shift takes its width."""

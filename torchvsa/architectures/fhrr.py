@@ -7,7 +7,7 @@ from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide, root
+from torchvsa.exact import divide, root, units
 
 
 class FHRR(VSA):
@@ -64,4 +64,5 @@ class FHRR(VSA):
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `|key|² · |program|²`: one product for the whole batch."""
-        return root(keys.abs() ** 2 @ (program.abs() ** 2))
+        unit = units(program)
+        return root(keys.abs() ** 2 @ ((program.abs() / unit) ** 2)) * unit.to(torch.float64)

@@ -5,7 +5,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide, norms
+from torchvsa.exact import divide, in_range
 
 
 class HRR(VSA):
@@ -61,7 +61,8 @@ class HRR(VSA):
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Scale to length 1; zero stays zero."""
-        return divide(raw, norms(raw)[..., None].to(raw.dtype))
+        rows, lengths, _ = in_range(raw)
+        return divide(rows, lengths[..., None].to(rows.dtype))
 
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]

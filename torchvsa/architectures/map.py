@@ -11,7 +11,7 @@ from torchvsa.architectures.base import VSA, Summands
 from torchvsa.architectures.draw import random_bits
 from torchvsa.architectures.sums import multiplied, stacked
 from torchvsa.architectures.ties import first_two
-from torchvsa.exact import dots, is_integer, root
+from torchvsa.exact import dots, is_integer, root, units, widened
 from torchvsa.operators import looked_up
 
 
@@ -175,6 +175,9 @@ class MAP(VSA):
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `key² · program²`: one product for the whole batch."""
-        wide = torch.float64 if is_integer(program) else program.dtype
-        squares = dots(keys.to(wide) ** 2, program.to(wide)[None] ** 2)[..., 0]
-        return root(squares)
+        if is_integer(program):
+            return root(dots(keys.to(torch.float64) ** 2, program.to(torch.float64)[None] ** 2)[..., 0])
+        program = widened(program)
+        unit = units(program)
+        squares = dots(keys.to(program.dtype) ** 2, (program / unit)[None] ** 2)[..., 0]
+        return root(squares) * unit.to(torch.float64)
