@@ -1,5 +1,6 @@
 """What every Vector Symbolic Architecture shares."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import reduce
@@ -10,6 +11,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
 from torchvsa._checks import INTEGERS, whole_number
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures.sums import check_weights, integer_sum, stacked, weighted
 from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
@@ -232,6 +234,16 @@ class VSA(ABC):
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """`norms(unbind(program, key))` for each key, in float64, without building the vectors where that pays."""
         return norms(self.unbind(program, keys))
+
+    def require_room(self, shape: Sequence[int], element_bytes: int, generator: torch.Generator | None = None) -> None:
+        """Raise `ValueError` unless hypervectors `[*shape, d]` fit into memory at so many bytes per element."""
+        if not torch.compiler.is_compiling() and (generator is None or generator.device.type == "cpu"):
+            count = math.prod(shape)
+            require_memory(
+                count * self.dim * element_bytes,
+                f"making {count} hypervectors of d = {self.dim} elements",
+                "take fewer dimensions, or some hypervectors at a time",
+            )
 
     def check(self, x: Tensor, argument: str) -> None:
         """Raise `ShapeError` unless `x` holds hypervectors of this dimension."""

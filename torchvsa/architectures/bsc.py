@@ -35,10 +35,12 @@ class BSC(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: fair, independent bits."""
+        self.require_room(shape, 3, generator)
         return random_bits(*shape, self.dim, generator=generator, device=device).view(torch.bool)
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """No bit set."""
+        self.require_room((), self.dtype.itemsize)
         return torch.zeros(self.dim, dtype=torch.bool)
 
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:

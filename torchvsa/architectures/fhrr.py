@@ -29,6 +29,7 @@ class FHRR(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: angles uniform in [-π, π)."""
+        self.require_room(shape, 2 * self.dtype.itemsize, generator)
         source = generator.device if generator is not None else device
         real = torch.float64 if self.dtype == torch.complex128 else torch.float32
         angles = torch.rand(*shape, self.dim, generator=generator, device=source, dtype=real) * (2 * math.pi) - math.pi
@@ -36,6 +37,7 @@ class FHRR(VSA):
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """All ones: every angle 0."""
+        self.require_room((), self.dtype.itemsize)
         return torch.ones(self.dim, dtype=self.dtype)
 
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:

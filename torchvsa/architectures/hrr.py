@@ -28,12 +28,14 @@ class HRR(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: normal with mean 0 and variance 1/d."""
+        self.require_room(shape, 2 * self.dtype.itemsize, generator)
         source = generator.device if generator is not None else device
         normal = torch.randn(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
         return (normal / self.dim**0.5).to(device if device is not None else source)
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """One at index 0, zero elsewhere."""
+        self.require_room((), self.dtype.itemsize)
         unit = torch.zeros(self.dim, dtype=self.dtype)
         unit[0] = 1
         return unit

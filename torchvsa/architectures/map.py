@@ -62,6 +62,9 @@ class MAP(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: bipolar -1 / +1 with equal chance, or uniform in [-1, 1]."""
+        # Bits, codes made of them, and those in another type; or uniform numbers, twice moved.
+        size = self.dtype.itemsize
+        self.require_room(shape, 3 * size if size == 1 or self.atoms == "uniform" else 2 + size, generator)
         if self.atoms == "uniform":
             source = generator.device if generator is not None else device
             uniform = torch.rand(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
@@ -71,6 +74,7 @@ class MAP(VSA):
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """All ones."""
+        self.require_room((), self.dtype.itemsize)
         return torch.ones(self.dim, dtype=self.dtype)
 
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:

@@ -25,6 +25,8 @@ class Combination(ABC):
     """Turns the n role-bound values of a record into its hypervector."""
 
     name: ClassVar[str]
+    copies: ClassVar[int] = 2
+    """Tables that are held at the same time while one is made."""
 
     def __init__(self, vsa: VSA) -> None:
         self.vsa = vsa
@@ -37,6 +39,10 @@ class Combination(ABC):
     ) -> Shaped[Tensor, "n levels d"]:
         """The table of role-bound values."""
         return self.vsa.bind(roles[:, None], values)
+
+    def bytes_to_make(self, sensors: int, levels: int) -> int:
+        """Memory that making the table takes at its peak."""
+        return self.copies * sensors * (levels + 1) * self.vsa.row_bytes
 
     @abstractmethod
     def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
@@ -82,6 +88,7 @@ class Bound(Combination):
     """
 
     name = "bind"
+    copies = 3
 
     def bound(
         self,
@@ -126,6 +133,10 @@ class SubsetBound(Bound):
                 f"subset is the largest number of sensors bound in one dimension, at least 1; got {subset}"
             )
         self.subset = subset
+
+    def bytes_to_make(self, sensors: int, levels: int) -> int:
+        """See `Combination.bytes_to_make`; an order of the sensors for each dimension is drawn as well, in int64."""
+        return max(super().bytes_to_make(sensors, levels), 2 * 8 * sensors * self.vsa.dim)
 
     def bound(
         self,
