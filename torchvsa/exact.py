@@ -144,6 +144,13 @@ def units(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch 1"]:
     return torch.where(largest == 0, torch.ones_like(power), power)
 
 
+def _lengths(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
+    if x.dim() != 2:
+        return root(paired_dots(x, x))
+    # In blocks, the squares stay in the cache.
+    return by_blocks(lambda rows: root(paired_dots(rows, rows)), x, row_bytes=2 * x.shape[1] * x.dtype.itemsize)
+
+
 def in_range(
     x: Shaped[Tensor, "*batch d"],
 ) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch"], Shaped[Tensor, "*batch 1"] | None]:
@@ -154,7 +161,7 @@ def in_range(
     x = widened(x)
     if is_integer(x):
         return x, root(paired_dots(x, x)), None
-    if readable(x) and ordinary(lengths := root(paired_dots(x, x))):
+    if readable(x) and ordinary(lengths := _lengths(x)):
         return x, lengths, None
     unit = units(x)
     # A division of complex numbers would take products of them, which vanish.
