@@ -129,7 +129,7 @@ def test_the_majority_of_raw_votes_is_that_of_their_signs() -> None:
     assert BSC(4).bundle(votes).tolist() == [False, False, False, True]
 
 
-@pytest.mark.parametrize("vsa", [MAP(4, "C", torch.int8), MAP(4, "B", torch.int8), BSC(4)], ids=repr)
+@pytest.mark.parametrize("vsa", [MAP(4, "C", torch.int8), MAP(4, "B", torch.int8), MAP(4, "B"), BSC(4)], ids=repr)
 def test_no_code_is_made_of_nan(vsa: torchvsa.VSA) -> None:
     with pytest.raises(ValueError, match="NaN"):
         vsa.normalize(torch.tensor([math.nan, 1, 2, 3]))

@@ -100,7 +100,7 @@ class MAP(VSA):
 
         A raw sum no longer knows its voters, so B decides its zeros by the sum's own signs, shifted by one.
         """
-        if self.integer and raw.is_floating_point():
+        if raw.is_floating_point() and (self.integer or self.variant == "B"):
             refuse_nan(raw, "the sum")
         if self.variant == "C":
             clipped = raw.clamp(-1, 1)
