@@ -10,8 +10,11 @@ import torch
 from jaxtyping import Int, Shaped
 from torch import Tensor, nn
 
+from torchvsa._checks import whole_number
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.blocks import by_blocks
+from torchvsa.errors import ShapeError
 from torchvsa.exact import dots, is_integer, signed
 
 
@@ -66,7 +69,7 @@ class FixedShift(Protection):
 
     def __init__(self, vsa: VSA, shift: int = 1) -> None:
         super().__init__(vsa)
-        self.shift = shift
+        self.shift = whole_number(shift, "the shift of a fixed shift is a whole number")
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Shift to the right."""
@@ -117,11 +120,18 @@ class SelfShift(Protection):
         if width not in ("mean", "sum"):
             raise ValueError(f"the width of a self-derived shift is 'mean' or 'sum'; got {width!r}")
         self.width_rule = width
+        count = _places(vsa.dim)
+        # The columns are computed in int64, in three steps.
+        require_memory(8 * (3 * count + 2) * vsa.dim, f"a self-derived shift of d = {vsa.dim}", "take fewer dimensions")
+        if h is not None and h.shape != (vsa.dim,):
+            raise ShapeError(f"h must be one hypervector of d = {vsa.dim} elements; got shape {tuple(h.shape)}")
+        if h is not None and h.dtype != vsa.dtype:
+            raise ValueError(f"h must be a hypervector of {vsa}; got {h.dtype}")
         if h is None:
             h = vsa.random(generator=torch.Generator().manual_seed(seed))
         self.register_buffer("h", h)
         # Indices in base 128, so that their sums are exact products of int8 on any device.
-        places = 128 ** torch.arange(_places(vsa.dim))
+        places = 128 ** torch.arange(count)
         digits = torch.arange(vsa.dim) // places[:, None] % 128
         columns = torch.cat([torch.ones(1, vsa.dim, dtype=torch.int64), digits])
         self.register_buffer("columns", columns.to(torch.int8), persistent=False)

@@ -25,6 +25,8 @@ class Combination(ABC):
     """Turns the n role-bound values of a record into its hypervector."""
 
     name: ClassVar[str]
+    copies: ClassVar[int] = 2
+    """Tables that are held at the same time while one is made."""
 
     def __init__(self, vsa: VSA) -> None:
         self.vsa = vsa
@@ -43,6 +45,10 @@ class Combination(ABC):
     ) -> Shaped[Tensor, "n levels d"]:
         """The table of role-bound values."""
         return self.vsa.bind(roles[:, None], values)
+
+    def bytes_to_make(self, sensors: int, levels: int) -> int:
+        """Memory that making the table takes at its peak."""
+        return self.copies * sensors * (levels + 1) * self.vsa.row_bytes
 
     @abstractmethod
     def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
@@ -72,7 +78,7 @@ class Bundled(Combination):
         # The voters themselves decide ties, so they are needed side by side.
         sensors = torch.arange(len(table), device=table.device)
         return by_blocks(
-            lambda rows: self.vsa.bundle(table[sensors, rows], weights=(rows >= 0).int()),
+            lambda rows: self.vsa.bundle(table[sensors, rows], weights=rows >= 0),
             indices,
             row_bytes=len(table) * self.vsa.row_bytes,
         )
@@ -88,6 +94,7 @@ class Bound(Combination):
     """
 
     name = "bind"
+    copies = 3
 
     def arrange(self, sensors: int, generator: torch.Generator | None) -> Shaped[Tensor, "n d"] | None:
         """An order of the elements for each sensor, where a rotation would not do; the first keeps its own."""
@@ -138,6 +145,10 @@ class SubsetBound(Bound):
                 f"subset is the largest number of sensors bound in one dimension, at least 1; got {subset}"
             )
         self.subset = subset
+
+    def bytes_to_make(self, sensors: int, levels: int) -> int:
+        """See `Combination.bytes_to_make`; an order of the sensors for each dimension is drawn as well, in int64."""
+        return max(super().bytes_to_make(sensors, levels), 2 * 8 * sensors * self.vsa.dim)
 
     def arrange(self, sensors: int, generator: torch.Generator | None) -> Shaped[Tensor, "n d"] | None:
         """Which sensors each dimension sees: true or false for each of both."""

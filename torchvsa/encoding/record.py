@@ -8,10 +8,12 @@ import torch
 from jaxtyping import Int, Shaped
 from torch import Tensor, nn
 
+from torchvsa._checks import whole_number
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.encoding.combine import COMBINATIONS
+from torchvsa.encoding.indices import check_indices
 from torchvsa.encoding.values import VALUES
-from torchvsa.errors import ShapeError
 
 
 class Record(nn.Module):
@@ -46,10 +48,16 @@ class Record(nn.Module):
     ) -> None:
         super().__init__()
         encode, combination = _find(VALUES, values, "value encoder"), _find(COMBINATIONS, combine, "combination")
+        sensors, levels = whole_number(sensors, "sensors is a number"), whole_number(levels, "levels is a number")
         if sensors < 1 or levels < 1:
             raise ValueError(f"a record needs at least one sensor and one level; got {sensors} and {levels}")
         self.vsa, self.sensors, self.levels = vsa, sensors, levels
         self.combination = combination(vsa, **_accepted(combine, combination, subset=subset))
+        require_memory(
+            self.combination.bytes_to_make(sensors, levels),
+            f"a table of {sensors} sensors, {levels} levels and d = {vsa.dim}",
+            "take fewer levels or dimensions, or thresholds, which keep no table",
+        )
         self.register_buffer("roles", vsa.random(sensors, generator=generator))
         options = _accepted(values, encode, span=span)
         codes = encode(vsa, levels, generator=generator, **options)
@@ -82,15 +90,13 @@ class Record(nn.Module):
             raise ValueError("arrangement must hold an order of all dimensions for each sensor")
 
     def forward(self, indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """Encode each row of indices in `[-1, levels)`; their values are not checked, which would stall a GPU.
+        """Encode each row of indices in `[-1, levels)`; -1 is *unobserved*.
 
-        Raises `ShapeError` unless the rows have one index per sensor.
+        Raises `ShapeError` unless the rows have one index per sensor, and `ValueError` for an index outside of that
+        range or of a type other than a signed integer or uint8. Values are checked on a CPU; another device asserts
+        them without being waited for, and graphs and `vmap` do not check them.
         """
-        if indices.dim() != 2 or indices.shape[1] != self.sensors:
-            raise ShapeError(
-                f"indices must be [batch, {self.sensors}], one column per sensor; got {tuple(indices.shape)}"
-            )
-        return self.combination.join(self.table, indices)
+        return self.combination.join(self.table, check_indices(indices, self.sensors, self.levels))
 
 
 def _find(parts: dict[str, Any], name: str, kind: str) -> Any:
