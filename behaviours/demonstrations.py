@@ -79,7 +79,8 @@ class Demonstrations:
 
     def where(self, keep: Any) -> "Demonstrations":
         """The rows for which `keep` `[N]`, one boolean per row, is true. Raises `ValueError` for anything else."""
-        chosen = mask(keep, len(self), "keep").to(self.sensors.device)
+        # Readings and episodes may be on different devices; an index from the CPU suits both.
+        chosen = mask(keep, len(self), "keep").cpu()
         return Demonstrations(self.sensors[chosen], self.commands[chosen], self.episodes[chosen], **self._names())
 
     @staticmethod
