@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 import pybullet
 import pytest
-from conftest import connected
+from clients import connected
 
 import sim
 from sim.fleet import Fleet, World
