@@ -5,33 +5,45 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from jaxtyping import Bool, Float64, Int64
+from jaxtyping import Float64, Int64
 from torch import Tensor
 
 from behaviours.schema import Schema
 from behaviours.storage import load_tensors, save_tensors
+from behaviours.tables import checked_names, column_names, compare_names, mask, numbers, whole_numbers
 from torchvsa import ShapeError
 
 
 class Demonstrations:
     """Pairs of sensor readings `[N, n]` and motor commands `[N, m]`, in the order in which they were shown.
 
-    `episodes` `[N]` says which run each row comes from (all from run 0, if left out). NaN readings were not
-    observed. Raises an error for no rows, unequal numbers of rows, and infinite or NaN commands.
+    Takes tensors, arrays, lists, or data frames (a series is one column), and copies them. `episodes` `[N]` says which
+    run each row comes from (all from run 0, if left out). NaN readings were not observed.
+
+    `sensor_names` and `actuator_names`, tuples or None, are the names of the columns: those of the data frames, unless
+    given. Where there are any, learning compares them with those of the schema.
+
+    Raises `ValueError` for no rows, unequal numbers of rows, infinite readings, infinite or NaN commands, episodes
+    that are no whole numbers, and whatever is not real numbers.
     """
 
-    def __init__(self, sensors: Any, commands: Any, episodes: Any = None) -> None:
-        self.sensors: Float64[Tensor, "N n"] = torch.as_tensor(sensors, dtype=torch.float64)
-        self.commands: Float64[Tensor, "N m"] = torch.as_tensor(commands, dtype=torch.float64)
-        for name, rows in (("sensors", self.sensors), ("commands", self.commands)):
-            if rows.dim() != 2 or rows.shape[1] == 0:
-                raise ShapeError(f"{name} must be rows of values, [N, columns]; got shape {tuple(rows.shape)}")
+    def __init__(
+        self,
+        sensors: Any,
+        commands: Any,
+        episodes: Any = None,
+        *,
+        sensor_names: Sequence[str] | None = None,
+        actuator_names: Sequence[str] | None = None,
+    ) -> None:
+        self.sensors: Float64[Tensor, "N n"] = _table(sensors, "sensors")
+        self.commands: Float64[Tensor, "N m"] = _table(commands, "commands")
         count = len(self.sensors)
         if count == 0:
             raise ValueError("a demonstration needs at least one row; this one is empty")
         if episodes is None:
             episodes = torch.zeros(count)
-        self.episodes: Int64[Tensor, "N"] = torch.as_tensor(episodes).to(torch.int64)
+        self.episodes: Int64[Tensor, "N"] = whole_numbers(episodes, "episodes").clone()
         if self.episodes.dim() != 1:
             raise ShapeError(f"episodes must be one number per row, [N]; got shape {tuple(self.episodes.shape)}")
         for name, rows in (("commands", self.commands), ("episodes", self.episodes)):
@@ -43,6 +55,8 @@ class Demonstrations:
         if not self.commands.isfinite().all():
             row, column = (~self.commands.isfinite()).nonzero()[0].tolist()
             raise ValueError(f"commands has {self.commands[row, column].item()} in row {row}, column {column}")
+        self.sensor_names = _names(sensors, self.sensors, sensor_names, "sensor_names")
+        self.actuator_names = _names(commands, self.commands, actuator_names, "actuator_names")
 
     def __len__(self) -> int:
         return len(self.sensors)
@@ -55,30 +69,109 @@ class Demonstrations:
 
     def check(self, schema: Schema) -> None:
         """Raise unless the columns are those of `schema` and every value is in range."""
+        self.check_names(schema)
         schema.check_readings(self.sensors)
         schema.command_levels(self.commands)
 
-    def where(self, keep: Bool[Tensor, "N"] | Sequence[bool]) -> "Demonstrations":
-        """The rows for which `keep` is true."""
-        mask = torch.as_tensor(keep, dtype=torch.bool)
-        return Demonstrations(self.sensors[mask], self.commands[mask], self.episodes[mask])
+    def check_names(self, schema: Schema) -> None:
+        """Raise `ValueError` if columns have names that are not those of `schema` in the same order."""
+        schema.check_names(self.sensor_names, self.actuator_names)
+
+    def where(self, keep: Any) -> "Demonstrations":
+        """The rows for which `keep` `[N]`, one boolean per row, is true. Raises `ValueError` for anything else."""
+        # Readings and episodes may be on different devices; an index from the CPU suits both.
+        chosen = mask(keep, len(self), "keep").cpu()
+        return Demonstrations(self.sensors[chosen], self.commands[chosen], self.episodes[chosen], **self._names())
 
     @staticmethod
     def join(parts: Iterable["Demonstrations"]) -> "Demonstrations":
-        """Several demonstrations one after the other, with their episode numbers as they are."""
+        """Several demonstrations one after the other, with their episode numbers as they are.
+
+        Raises `ValueError` for none at all, and for parts with different columns or names of columns.
+        """
         parts = list(parts)
-        return Demonstrations(*(torch.cat([getattr(p, f) for p in parts]) for f in ("sensors", "commands", "episodes")))
+        if not parts:
+            raise ValueError("there are no demonstrations to join")
+        first = parts[0]
+        for number, part in enumerate(parts):
+            for field in ("sensors", "commands"):
+                columns, expected = getattr(part, field).shape[1], getattr(first, field).shape[1]
+                if columns != expected:
+                    raise ShapeError(f"{field} of part {number} has {columns} columns, those of part 0 {expected}")
+            if part._names() != first._names():
+                raise ValueError(
+                    f"part {number} has columns with the names {part._names()}, part 0 {first._names()}; "
+                    "joined parts have the same names in the same order, or none"
+                )
+        joined = (torch.cat([getattr(part, field) for part in parts]) for field in ("sensors", "commands", "episodes"))
+        return Demonstrations(*joined, **first._names())
 
     def save(self, path: str | Path) -> Path:
         """Write to one safetensors file, whole or not at all."""
         tensors = {"sensors": self.sensors, "commands": self.commands, "episodes": self.episodes}
-        return save_tensors(path, "demonstrations", tensors, {"rows": len(self)})
+        names = {key: list(value) for key, value in self._names().items() if value is not None}
+        return save_tensors(path, "demonstrations", tensors, {"rows": len(self), **names})
 
     @classmethod
     def load(cls, path: str | Path) -> "Demonstrations":
-        """Read what `save` wrote."""
-        tensors, _ = load_tensors(path, "demonstrations")
+        """Read what `save` wrote. Raises `ValueError`, naming the file, for anything else."""
         try:
-            return cls(tensors["sensors"], tensors["commands"], tensors["episodes"])
-        except (KeyError, ValueError) as error:
+            tensors, about = load_tensors(path, "demonstrations")
+        except (ValueError, RecursionError) as error:
+            if str(path) in str(error):
+                raise
+            raise ValueError(f"{path} is not a readable torchvsa demonstrations file: {error}") from error
+        try:
+            _check_file(tensors, about)
+            names = {key: about.get(key) for key in _NAMES}
+            return cls(tensors["sensors"], tensors["commands"], tensors["episodes"], **names)
+        except (ValueError, RecursionError) as error:
             raise ValueError(f"{path} does not hold demonstrations of this version: {error}") from error
+
+    def _names(self) -> dict[str, tuple[str, ...] | None]:
+        return {"sensor_names": self.sensor_names, "actuator_names": self.actuator_names}
+
+
+_TYPES = {"sensors": torch.float64, "commands": torch.float64, "episodes": torch.int64}
+_NAMES = ("sensor_names", "actuator_names")
+
+
+def _table(values: Any, name: str) -> Float64[Tensor, "N columns"]:
+    """A copy of a table, in which a series is one column."""
+    rows = numbers(values, name).detach()
+    if rows.dim() == 1 and hasattr(values, "to_numpy"):
+        rows = rows[:, None]
+    if rows.dim() != 2 or rows.shape[1] == 0:
+        hint = "; write one row as [row]" if rows.dim() == 1 and len(rows) else ""
+        raise ShapeError(f"{name} must be rows of values, [N, columns]; got shape {tuple(rows.shape)}{hint}")
+    return rows.clone(memory_format=torch.contiguous_format)
+
+
+def _names(values: Any, rows: Tensor, given: Sequence[str] | None, what: str) -> tuple[str, ...] | None:
+    """The names of the columns: those `given`, which those of a data frame must equal."""
+    found = column_names(values)
+    if given is None:
+        return found
+    names = checked_names(given, what)
+    if len(names) != rows.shape[1]:
+        raise ValueError(f"{what} has {len(names)} names for {rows.shape[1]} columns")
+    if found is not None:
+        compare_names(found, names, "data frame", what)
+    return names
+
+
+def _check_file(tensors: dict[str, Tensor], about: Any) -> None:
+    """Raise `ValueError`, naming the field, unless a file holds what `Demonstrations.save` writes."""
+    if set(tensors) != set(_TYPES):
+        raise ValueError(f"expected the tensors {', '.join(_TYPES)}; got {', '.join(sorted(tensors)) or 'none'}")
+    for name, dtype in _TYPES.items():
+        if tensors[name].dtype != dtype:
+            raise ValueError(f"{name} must be of type {dtype}; got {tensors[name].dtype}")
+    if not isinstance(about, dict) or not {"rows"} <= set(about) <= {"rows", *_NAMES}:
+        raise ValueError(f"its description must hold 'rows' and may hold {', '.join(_NAMES)}; got {about!r:.200}")
+    rows = about["rows"]
+    if type(rows) is not int or tensors["sensors"].shape[:1] != (rows,):
+        raise ValueError(f"rows is {rows!r:.200}, but sensors has shape {tuple(tensors['sensors'].shape)}")
+    for name in _NAMES:
+        if name in about and not isinstance(about[name], list):
+            raise ValueError(f"{name} must be a list of strings; got {about[name]!r:.200}")

@@ -1,78 +1,34 @@
 """Estimators for scikit-learn: one hypervector that classifies, and one that interpolates.
 
-The only module of the behaviours that needs scikit-learn; `behaviours` loads it when it is asked for.
+With their base, `behaviours.quantiles`, the only modules of the behaviours that need scikit-learn; `behaviours` loads
+them when they are asked for.
 """
 
+import sys
 from typing import Any, Self
 
 import numpy as np
 import torch
 from jaxtyping import Float64, Int64, Shaped
-from sklearn.base import BaseEstimator, ClassifierMixin, RegressorMixin
-from sklearn.utils import check_random_state
+from sklearn.base import ClassifierMixin, RegressorMixin
 from sklearn.utils.multiclass import check_classification_targets
-from sklearn.utils.validation import check_is_fitted, validate_data
+from sklearn.utils.validation import check_is_fitted
 from torch import Tensor
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import Gradient
 from behaviours.learning.least_squares import solve
+from behaviours.progress import between
+from behaviours.quantiles import QuantileEncoding
 from behaviours.recall import scores
 from behaviours.report import LearningReport
-from behaviours.schema import Actuator, Schema, Sensor, quantile_edges
-from behaviours.space import Encoder, Space
-from torchvsa import MAP
+from behaviours.schema import Actuator
+from behaviours.space import Space
 from torchvsa.exact import dots, norms
 
-_ROWS = 1024
-"""Rows encoded at once."""
 
-
-class _Encoding(BaseEstimator):
-    """What classifier and regressor share: sensors that are binned at the quantiles of their readings."""
-
-    dim: int
-    bins: int
-    subset: int
-    random_state: Any
-
-    def __sklearn_tags__(self) -> Any:
-        tags = super().__sklearn_tags__()
-        tags.input_tags.allow_nan = True
-        return tags
-
-    def _space(self, readings: Float64[np.ndarray, "N n"], actuators: list[Actuator], seed: int) -> Space:
-        """Codebooks for these readings; the edges of the bins see nothing but the readings."""
-        names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(readings.shape[1])])
-        sensors = []
-        for name, column in zip(names, torch.tensor(readings).T, strict=True):
-            seen = column[~column.isnan()]
-            low, high = (seen.min().item(), seen.max().item()) if len(seen) else (0.0, 0.0)
-            # A constant reading has no range, and a sensor needs one.
-            low, high = (low, high) if low < high else (low - 1, high + 1)
-            sensors.append(Sensor(str(name), low, high, beyond="clip", edges=quantile_edges(seen, self.bins).tolist()))
-        encoder = Encoder(self.bins, combine="thresholds", subset=self.subset, results="balanced")
-        vsa = MAP(self.dim, dtype=torch.int8)
-        return Space(Schema(sensors, actuators), vsa, encoder, protection="none", seed=seed)
-
-    def _conditions(self, space: Space, readings: Float64[np.ndarray, "N n"]) -> list[Shaped[Tensor, "batch d"]]:
-        """The encoded rows, some at a time; raises for rows in which nothing was observed."""
-        blind = np.isnan(readings).all(1)
-        if blind.any():
-            raise ValueError(f"row {int(blind.argmax())} has no observed feature: all of its values are NaN")
-        blocks = torch.tensor(readings).split(_ROWS)
-        return [space.encode(space.bins(block)) for block in blocks]
-
-    def _checked(self, *data: Any, **options: Any) -> Any:
-        """Readings `[N, n]` as float64, and targets where they are given, as scikit-learn checks them."""
-        return validate_data(self, *data, dtype=np.float64, order="C", ensure_all_finite="allow-nan", **options)
-
-    def _seed(self) -> int:
-        return int(check_random_state(self.random_state).randint(2**31 - 1))
-
-
-class BehaviourClassifier(ClassifierMixin, _Encoding):
+class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     """Classify rows of readings `[N, n]` with one hypervector of `dim` numbers.
 
     Each feature is a sensor, binned at the quantiles of its training values; each dimension of a condition
@@ -84,10 +40,14 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
     | parameter | meaning |
     |---|---|
     | `dim` | elements of the program |
-    | `bins` | quantile bins per feature, at most; the codebook takes features · (bins + 1) · dim bytes |
+    | `bins` | quantile bins per feature, at most; their edges take features · bins floats |
     | `subset` | most features that interact in one dimension |
     | `passes`, `batch`, `learning_rate` | of the gradient descent |
     | `random_state` | seeds codebooks and batches |
+    | `verbose` | 1 prints now and then which share of the training is done |
+
+    The codebook takes about 17 · `subset` · `dim` bytes, however many bins and features there are. A `fit` or
+    `partial_fit` that fails leaves the estimator as it was.
 
     Fitted: `classes_` `[K]`, `behaviour_` (a `Behaviour`; its `program` is the hypervector), `n_features_in_`.
     """
@@ -102,6 +62,7 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
         batch: int = 128,
         learning_rate: float = 0.05,
         random_state: Any = None,
+        verbose: int = 0,
     ) -> None:
         self.dim = dim
         self.bins = bins
@@ -110,20 +71,26 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
         self.batch = batch
         self.learning_rate = learning_rate
         self.random_state = random_state
+        self.verbose = verbose
 
     def fit(self, X: Any, y: Any) -> Self:  # noqa: N803 (scikit-learn's own name)
         """Train the program on rows `X` `[N, n]` and labels `y` `[N]`.
 
-        Raises `ValueError` for fewer than two classes, infinite values, and rows without any value.
+        Raises `ValueError` for fewer than two classes, infinite values, rows without any value, features whose range is
+        no finite float, and parameters that cannot work.
         """
-        readings, y = self._checked(X, y)
-        check_classification_targets(y)
-        self.classes_, labels = np.unique(y, return_inverse=True)
-        if len(self.classes_) < 2:
-            raise ValueError(f"a classifier needs at least 2 classes; the data hold one class, {self.classes_[0]!r}")
-        space = self._class_space(readings)
-        shown = Demonstrations(torch.tensor(readings), torch.tensor(labels[:, None]))
-        self.behaviour_ = self._rule(space.seed).fit(space, shown)
+        with self._all_or_nothing():
+            self._check_parameters()
+            readings, y = self._checked(X, y)
+            check_classification_targets(y)
+            self.classes_, labels = np.unique(y, return_inverse=True)
+            if len(self.classes_) < 2:
+                raise ValueError(
+                    f"a classifier needs at least 2 classes; the data hold one class, {self.classes_[0]!r}"
+                )
+            space = self._class_space(readings)
+            shown = Demonstrations(torch.tensor(readings), torch.tensor(labels[:, None]))
+            self.behaviour_ = self._finite(self._rule(space.seed).fit(space, shown, self._progress()))
         return self
 
     def partial_fit(self, X: Any, y: Any, classes: Any = None) -> Self:  # noqa: N803
@@ -135,33 +102,52 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
 
         Raises `ValueError` for labels that are none of `classes`, and as `fit` does.
         """
-        first = not hasattr(self, "behaviour_")
-        readings, y = self._checked(X, y, reset=first)
-        check_classification_targets(y)
-        given = None if classes is None else np.unique(classes)
-        if first:
-            if given is None or len(given) < 2:
-                raise ValueError(f"the first call of partial_fit needs all classes, at least 2; got classes={classes}")
-            self.classes_ = given
-        elif given is not None and not np.array_equal(given, self.classes_):
-            raise ValueError(f"classes are {self.classes_} since the first call; got {given}")
-        if len(unknown := np.setdiff1d(y, self.classes_)):
-            raise ValueError(f"y holds {unknown[0]!r}, which is none of the classes {self.classes_}")
-        if first:
-            self.behaviour_ = self._blank(self._class_space(readings))
-        labels = torch.from_numpy(np.searchsorted(self.classes_, y)[:, None])
-        before = self.behaviour_
-        # Another seed for each call, or all would visit their rows in the same order.
-        rule = self._rule(before.space.seed + before.report.updates)
-        self.behaviour_ = rule.partial_fit(before, Demonstrations(torch.tensor(readings), labels))
+        with self._all_or_nothing():
+            self._check_parameters()
+            first = not hasattr(self, "behaviour_")
+            readings, y = self._checked(X, y, reset=first)
+            check_classification_targets(y)
+            given = None if classes is None else np.unique(classes)
+            if first:
+                if given is None or len(given) < 2:
+                    raise ValueError(
+                        f"the first call of partial_fit needs all classes, at least 2; got classes={classes}"
+                    )
+                self.classes_ = given
+            elif given is not None and not np.array_equal(given, self.classes_):
+                raise ValueError(f"classes are {self.classes_} since the first call; got {given}")
+            if len(unknown := np.setdiff1d(y, self.classes_)):
+                raise ValueError(f"y holds {unknown[0]!r}, which is none of the classes {self.classes_}")
+            before = self._blank(self._class_space(readings)) if first else self.behaviour_
+            labels = torch.from_numpy(np.searchsorted(self.classes_, y)[:, None])
+            # Another seed for each call, or all would visit their rows in the same order.
+            rule = self._rule(before.space.seed + before.report.updates)
+            shown = Demonstrations(torch.tensor(readings), labels)
+            self.behaviour_ = self._finite(rule.partial_fit(before, shown))
+            self._progress()(1.0)
         return self
+
+    def _check_parameters(self) -> None:
+        super()._check_parameters()
+        self._whole("passes")
+        self._whole("batch")
+        if self._positive("learning_rate") > 1e30:
+            # The program is float32, and so are its steps.
+            raise ValueError(f"learning_rate must be a number of float32, at most 1e30; got {self.learning_rate!r}")
 
     def _class_space(self, readings: Float64[np.ndarray, "N n"]) -> Space:
         count = len(self.classes_)
-        return self._space(readings, [Actuator("class", 0, count - 1, levels=count)], self._seed())
+        return self._space(readings, [Actuator("class", 0, count - 1, levels=count)])
 
     def _rule(self, seed: int) -> Gradient:
-        return Gradient(passes=self.passes, batch=self.batch, learning_rate=self.learning_rate, sparse=True, seed=seed)
+        passes, batch, rate = self._whole("passes"), self._whole("batch"), self._positive("learning_rate")
+        return Gradient(passes=passes, batch=batch, learning_rate=rate, sparse=True, seed=seed)
+
+    def _finite(self, behaviour: Behaviour) -> Behaviour:
+        """The behaviour, unless training left the numbers."""
+        if not behaviour.program.isfinite().all():
+            raise ValueError(f"training diverged with learning_rate={self.learning_rate}; take a lower one")
+        return behaviour
 
     def _blank(self, space: Space) -> Behaviour:
         """The behaviour that knows all classes and no condition."""
@@ -200,7 +186,7 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
         return self.classes_[best]
 
 
-class BehaviourRegressor(RegressorMixin, _Encoding):
+class BehaviourRegressor(RegressorMixin, QuantileEncoding):
     """Answer rows of readings `[N, n]` with smooth values, by one hypervector of `dim` numbers.
 
     Readings are encoded as in `BehaviourClassifier`. Each output is an actuator with a random role, and the
@@ -209,7 +195,9 @@ class BehaviourRegressor(RegressorMixin, _Encoding):
     role. Deviations from the mean of the training rows are learned, in units of their standard deviation.
 
     `ridge` is the weight of the program's squared length, in units of one stored pair's; the other parameters as
-    there. Fitted: `program_` `[dim]`, `space_`, `mean_` and `scale_` `[m]`, `n_features_in_`.
+    there. A `fit` that fails leaves the estimator as it was.
+
+    Fitted: `program_` `[dim]`, `space_`, `mean_` and `scale_` `[m]`, `n_features_in_`.
     """
 
     def __init__(
@@ -220,12 +208,14 @@ class BehaviourRegressor(RegressorMixin, _Encoding):
         subset: int = 2,
         ridge: float = 0.1,
         random_state: Any = None,
+        verbose: int = 0,
     ) -> None:
         self.dim = dim
         self.bins = bins
         self.subset = subset
         self.ridge = ridge
         self.random_state = random_state
+        self.verbose = verbose
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -235,21 +225,35 @@ class BehaviourRegressor(RegressorMixin, _Encoding):
     def fit(self, X: Any, y: Any) -> Self:  # noqa: N803
         """Train the program on rows `X` `[N, n]` and values `y` `[N]` or `[N, m]`.
 
-        Raises `ValueError` for infinite values and rows without any value.
+        Raises `ValueError` for infinite values, rows without any value, features whose range is no finite float, and
+        parameters that cannot work.
         """
-        readings, y = self._checked(X, y, multi_output=True, y_numeric=True)
-        values = np.asarray(y, dtype=np.float64)
-        self._flat = values.ndim == 1
-        values = values.reshape(len(values), -1)
-        self.mean_, deviation = values.mean(0), values.std(0)
-        self.scale_ = np.where(deviation > 0, deviation, 1.0)
-        actuators = [Actuator(f"y{i}", -1, 1, levels=2) for i in range(values.shape[1])]
-        self.space_ = self._space(readings, actuators, self._seed())
-        conditions = torch.cat(self._conditions(self.space_, readings))
-        targets = torch.from_numpy((values - self.mean_) / self.scale_)
-        roles = self.space_.results.roles
-        self.program_ = solve(self.space_.vsa, conditions, roles, targets, self.ridge)
+        with self._all_or_nothing():
+            self._check_parameters()
+            ridge = self._positive("ridge")
+            readings, y = self._checked(X, y, multi_output=True, y_numeric=True)
+            values = np.asarray(y, dtype=np.float64)
+            self._flat = values.ndim == 1
+            targets, self.mean_, self.scale_ = _standardised(values.reshape(len(values), -1))
+            actuators = [Actuator(f"y{i}", -1, 1, levels=2) for i in range(targets.shape[1])]
+            self.space_ = self._space(readings, actuators)
+            progress = self._progress()
+            conditions = torch.cat(self._conditions(self.space_, readings, between(progress, 0, 0.5)))
+            self.program_ = self._solved(conditions, torch.from_numpy(targets), ridge)
+            progress(1.0)
         return self
+
+    def _solved(
+        self, conditions: Shaped[Tensor, "N d"], targets: Float64[Tensor, "N m"], ridge: float
+    ) -> Shaped[Tensor, "d"]:
+        """The program of the ridge problem; raises `ValueError` where `ridge` leaves it without a solution."""
+        try:
+            program = solve(self.space_.vsa, conditions, self.space_.results.roles, targets, ridge)
+        except torch.linalg.LinAlgError as error:  # pyright: ignore[reportPrivateImportUsage]
+            raise ValueError(f"ridge={ridge} leaves the system of these rows singular; take a larger one") from error
+        if not program.isfinite().all():
+            raise ValueError(f"ridge={ridge} leaves no finite solution for these rows; take one nearer to 1")
+        return program
 
     def predict(self, X: Any) -> Float64[np.ndarray, "N ..."]:  # noqa: N803
         """The values that the program answers, `[N]` or `[N, m]` as in `fit`."""
@@ -257,5 +261,27 @@ class BehaviourRegressor(RegressorMixin, _Encoding):
         readings = self._checked(X, reset=False)
         folded = self.space_.vsa.unbind(self.program_.double(), self.space_.results.roles)
         answers = torch.cat([dots(block, folded) for block in self._conditions(self.space_, readings)])
-        values = answers.numpy() * self.scale_ + self.mean_
+        with np.errstate(over="ignore"):
+            values = answers.numpy() * self.scale_ + self.mean_
+        # Answers a little beyond the values shown may be beyond the largest float.
+        values = values.clip(-sys.float_info.max, sys.float_info.max)
         return values[:, 0] if self._flat else values
+
+
+_SQUARABLE = 400
+"""Values between 2^-400 and 2^400 can be squared and summed in float64."""
+
+
+def _standardised(
+    values: Float64[np.ndarray, "N m"],
+) -> tuple[Float64[np.ndarray, "N m"], Float64[np.ndarray, "m"], Float64[np.ndarray, "m"]]:
+    """Deviations from the mean in units of the standard deviation (1 where there is none), the mean, and the unit."""
+    exponent = np.frexp(np.abs(values).max(0))[1]
+    # Powers of two, which change no digit, bring the others to about 1.
+    exponent = np.where(np.abs(exponent) > _SQUARABLE, exponent, 0)
+    moderate = np.ldexp(values, -exponent)
+    mean, deviation = moderate.mean(0), moderate.std(0)
+    unit = np.where(deviation > 0, deviation, 1.0)
+    with np.errstate(over="ignore", under="ignore"):
+        scale = np.where(deviation > 0, np.ldexp(unit, exponent), 1.0).clip(max=sys.float_info.max)
+        return (moderate - mean) / unit, np.ldexp(mean, exponent), scale

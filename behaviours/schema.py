@@ -1,73 +1,29 @@
 """What a robot senses and does: names, ranges and units."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from itertools import pairwise
-from typing import Any, Literal
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from behaviours.parts import Actuator, Sensor, most_parts
+from behaviours.tables import column_names, compare_names, numbers
 from torchvsa import ShapeError
-
-
-def _check_range(kind: str, name: str, low: float, high: float) -> None:
-    if not name:
-        raise ValueError(f"every {kind} needs a name")
-    if not (np.isfinite(low) and np.isfinite(high) and low < high):
-        raise ValueError(f"{kind} {name!r} needs a finite range with low < high; got [{low}, {high}]")
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """A real-valued sensor with readings in `[low, high]`; NaN means that it was not observed.
-
-    `beyond` says what becomes of a reading outside the range: an error, or the nearest bound. `edges`, sorted values
-    within the range, part its bins where they shall not be of equal width: each edge belongs to the bin above
-    it, and the bins between equal edges stay empty. See `quantile_edges`.
-    """
-
-    name: str
-    low: float
-    high: float
-    unit: str = ""
-    beyond: Literal["error", "clip"] = "error"
-    edges: Sequence[float] | None = None
-
-    def __post_init__(self) -> None:
-        _check_range("sensor", self.name, self.low, self.high)
-        if self.edges is not None:
-            object.__setattr__(self, "edges", tuple(map(float, self.edges)))
-            marks = (self.low, *self.edges, self.high)
-            if not all(a <= b for a, b in pairwise(marks)):
-                raise ValueError(
-                    f"sensor {self.name!r}: edges must be sorted and lie within [{self.low:g}, {self.high:g}]"
-                )
-        if self.beyond not in ("error", "clip"):
-            raise ValueError(f"sensor {self.name!r}: beyond is 'error' or 'clip'; got {self.beyond!r}")
-
-
-@dataclass(frozen=True)
-class Actuator:
-    """A motor with commands in `[low, high]`, told apart at `levels` evenly spaced values, both ends among them."""
-
-    name: str
-    low: float
-    high: float
-    unit: str = ""
-    levels: int = 21
-
-    def __post_init__(self) -> None:
-        _check_range("actuator", self.name, self.low, self.high)
-        if self.levels < 2:
-            raise ValueError(f"actuator {self.name!r} needs at least 2 levels; got {self.levels}")
+from torchvsa._memory_limit import require_memory
 
 
 @dataclass(frozen=True)
 class Schema:
-    """The sensors and actuators of a robot, in the order of the columns of its data."""
+    """The sensors and actuators of a robot, in the order of the columns of its data.
+
+    Readings and commands are rows of numbers: tensors, arrays, lists, or a DataFrame, whose names of columns must be
+    those of the schema in the same order.
+    """
 
     sensors: Sequence[Sensor]
     actuators: Sequence[Actuator]
@@ -76,11 +32,29 @@ class Schema:
         object.__setattr__(self, "sensors", tuple(self.sensors))
         object.__setattr__(self, "actuators", tuple(self.actuators))
         for kind, parts in (("sensor", self.sensors), ("actuator", self.actuators)):
+            if not all(isinstance(part, Sensor if kind == "sensor" else Actuator) for part in parts):
+                raise ValueError(f"the {kind}s of a schema must be of type {kind.capitalize()}; got {parts}")
             names = [part.name for part in parts]
             if not names:
                 raise ValueError(f"a schema needs at least one {kind}")
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} names must differ; got {', '.join(names)}")
+
+    @cached_property
+    def _most_bins(self) -> float:
+        """The most bins of equal width that every sensor without edges can be parted into."""
+        even = (most_parts(sensor.low, sensor.high) for sensor in self.sensors if sensor.edges is None)
+        return min(even, default=math.inf)
+
+    def check_names(self, sensors: Sequence[str] | None = None, actuators: Sequence[str] | None = None) -> None:
+        """Raise `ValueError`, naming the columns, unless these are the schema's names in the same order.
+
+        None stands for columns without names, which are not compared.
+        """
+        if sensors is not None:
+            compare_names(sensors, [sensor.name for sensor in self.sensors], "sensor readings")
+        if actuators is not None:
+            compare_names(actuators, [actuator.name for actuator in self.actuators], "commands")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for a file."""
@@ -98,6 +72,8 @@ class Schema:
         Sensors with `edges` have their bins between them instead.
         Raises an error that names sensor, row and range for infinite readings and those out of range.
         """
+        if not torch.compiler.is_compiling() and bins > self._most_bins:
+            self._refuse_bins(bins)
         rows, low, high = self._checked(readings)
         unseen = rows.isnan()
         index = ((rows - low) * bins / (high - low)).floor().clamp(0, bins - 1)
@@ -107,6 +83,15 @@ class Schema:
         columns = zip(self.sensors, rows.unbind(1), index.unbind(1), strict=True)
         index = torch.stack([self._between_edges(s, bins, row, even) for s, row, even in columns], 1)
         return torch.where(unseen, -1, index)
+
+    def _refuse_bins(self, bins: int) -> None:
+        """Raise for the first sensor whose range cannot be parted into so many bins."""
+        for sensor in self.sensors:
+            if sensor.edges is None and bins > most_parts(sensor.low, sensor.high):
+                raise ValueError(
+                    f"sensor {sensor.name!r}: {bins} bins of the range [{sensor.low}, {sensor.high}] cannot be told "
+                    "apart in float64; take fewer, or a range of another width or nearer to 0"
+                )
 
     @staticmethod
     def _between_edges(sensor: Sensor, bins: int, readings: Tensor, even: Tensor) -> Int64[Tensor, "batch"]:
@@ -187,25 +172,37 @@ def quantile_edges(readings: Any, bins: int) -> Float64[Tensor, "edges"]:
     """The edges `[bins - 1]` that part readings `[N]` into `bins` bins of nearly equal counts.
 
     An edge lies midway between two neighbouring readings; where readings repeat, edges coincide. NaN is left
-    out; without any reading there are no edges. Sees no commands.
+    out; without any reading there are no edges. Sees no commands. Raises `ValueError` for infinite readings, and for
+    fewer than one bin.
     """
-    values = torch.as_tensor(readings, dtype=torch.float64).flatten()
+    if bins < 1:
+        raise ValueError(f"readings are parted into at least one bin; got {bins}")
+    values = numbers(readings, "readings").flatten()
+    if values.isinf().any():
+        raise ValueError("readings must be finite, or NaN where there is none")
     values = values[~values.isnan()].sort().values
     if len(values) < 2:
         return values[:0]
+    # Positions, the readings on both sides, and what lies between them.
+    require_memory(6 * 8 * bins, f"the edges of {bins:,} bins", "take fewer bins")
     above = (torch.arange(1, bins) * len(values)).div(bins, rounding_mode="floor").clamp(min=1)
     low, high = values[above - 1], values[above]
     middle = low + (high - low) / 2
+    # Neighbours of opposite signs may be further apart than the largest float.
+    middle = torch.where(middle.isinf(), low / 2 + high / 2, middle)
     # The mean of two floats side by side may be the lower of them, and would not part them.
     return torch.where(middle > low, middle, high)
 
 
 def _rows(values: Any, columns: int, what: str, names: list[str]) -> Float64[Tensor, "batch columns"]:
-    # Copied, so that a read-only array is accepted without a warning.
-    rows = torch.as_tensor(np.array(values) if isinstance(values, np.ndarray) else values, dtype=torch.float64)
+    rows = numbers(values, what)
     if rows.dim() != 2 or rows.shape[1] != columns:
+        hint = "; write one row as a batch of one, [row]" if rows.dim() == 1 and len(rows) == columns else ""
         raise ShapeError(
             f"{what} must be rows of {columns} values ({', '.join(names)}), shape [batch, {columns}]; "
-            f"got shape {tuple(rows.shape)}"
+            f"got shape {tuple(rows.shape)}{hint}"
         )
+    given = column_names(values)
+    if given is not None:
+        compare_names(given, names, what)
     return rows

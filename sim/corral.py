@@ -13,6 +13,8 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from sim.checks import whole_number
+
 WALL_GROUP, WALL_MASK = 1, 3
 """Walls, lamp and floor collide with everything; `rayTestBatch` with a mask misses them otherwise."""
 ROBOT_GROUP, ROBOT_MASK = 2, 1
@@ -55,7 +57,7 @@ class Arena:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not isinstance(value, int | float) or not math.isfinite(value):
+            if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
                 raise ValueError(f"Arena.{field.name} is {value!r}; expected a finite number")
         for name in ("side", "gap", "lamp_beyond", "lamp_radius", "lamp_height", "wall_height", "wall_thickness"):
             if getattr(self, name) <= 0:
@@ -117,7 +119,7 @@ def find_arena(arena: str | Arena) -> Arena:
     """Look an arena up by name; an `Arena` is returned as it is. Raises `ValueError` listing the known names."""
     if isinstance(arena, Arena):
         return arena
-    if arena not in ARENAS:
+    if not isinstance(arena, str) or arena not in ARENAS:
         raise ValueError(f"unknown arena {arena!r}; expected an Arena or one of {sorted(ARENAS)}")
     return ARENAS[arena]
 
@@ -136,10 +138,9 @@ def draw_episode(arena: Arena, seed: int, episode: int) -> tuple[Start, np.rando
 
     The generator is the episode's own, seeded with (seed, episode). So every controller meets the same start and the
     same noise, at any batch size, worker count or order. Starts are uniform over the corral less its margin, headings
-    over the circle. Raises `ValueError` for a negative seed or episode.
+    over the circle. Raises `ValueError` unless seed and episode are whole numbers, 0 or more.
     """
-    if seed < 0 or episode < 0:
-        raise ValueError(f"seed {seed}, episode {episode}: expected both to be 0 or more")
+    seed, episode = whole_number("seed", seed), whole_number("episode", episode)
     generator = np.random.default_rng([seed, episode])
     reach = arena.side / 2 - arena.start_margin
     x, y, turn = generator.uniform(-1.0, 1.0, size=3).tolist()

@@ -12,6 +12,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from sim.camera import photograph
+from sim.checks import whole_number
 from sim.corral import Arena
 from sim.fleet import Fleet, State, check_commands, control_steps
 from sim.robot import ACTUATORS, CONTROL_HZ
@@ -47,6 +48,11 @@ class _Cells:
         self.fleet.reset(slot, episode)
         self.tracker.reset(slot)
         self.episodes[slot] = episode
+
+    def check_open(self) -> None:
+        """Raise if the physics clients are disconnected."""
+        if self.fleet.closed:
+            raise gymnasium.error.ClosedEnvironmentError("the environment is closed; make another one")
 
     def observe(self) -> State:
         slots = range(len(self.episodes))
@@ -149,24 +155,32 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self._episode: int | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode (see "Start"). Raises `ValueError` for an option other than `episode`."""
-        super().reset(seed=seed)
-        if seed is not None or self._episode is None:
-            self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
-            self._episode = -1
+        """Begin an episode (see "Start").
+
+        Raises `ValueError` for an option other than `episode`, and unless seed and episode are whole numbers from 0 on.
+        """
+        self._cells.check_open()
         unknown = set(options or {}) - {"episode"}
         if unknown:
-            raise ValueError(f"unknown reset options {sorted(unknown)}; expected 'episode' alone")
-        self._episode = int((options or {}).get("episode", self._episode + 1))
+            raise ValueError(f"unknown reset options {sorted(map(str, unknown))}; expected 'episode' alone")
+        asked = whole_number("episode", options["episode"]) if options else None
+        seed = None if seed is None else whole_number("seed", seed)
+        super().reset(seed=seed)
+        before = self._episode
+        if seed is not None or before is None:
+            self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+            before = -1
+        self._episode = before + 1 if asked is None else asked
         self._cells.reset(0, self._episode)
         state = self._cells.observe()
         return state.sensors[0], self._info(state)
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Drive for one control step. Raises `ValueError` for an action that is not two finite numbers."""
+        self._cells.check_open()
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        self._cells.drive([0], np.asarray(action)[None])
+        self._cells.drive([0], [action])
         state = self._cells.observe()
         success = bool(self._cells.tracker.success[0])
         return state.sensors[0], float(success), success, False, self._info(state)
@@ -175,6 +189,7 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         """A picture `[H, W, 3]`, or None without a render mode."""
         if self.render_mode is None:
             return None
+        self._cells.check_open()
         return photograph(self._cells.fleet.worlds[0].client, self._cells.fleet.arena)
 
     def close(self) -> None:
@@ -212,6 +227,8 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         render_mode: str | None = None,
     ) -> None:
         _check_render_mode(render_mode)
+        num_envs = whole_number("num_envs", num_envs, 1)
+        max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
         self.num_envs = num_envs
         self.render_mode = render_mode
         self.single_observation_space = _box(SENSORS)
@@ -224,10 +241,12 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         self._ready = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin the first episode of every environment. Raises `ValueError` for any option."""
-        super().reset(seed=seed)
+        """Begin the first episode of every environment. Raises `ValueError` for any option, and as the scalar does."""
+        self._cells.check_open()
         if options:
-            raise ValueError(f"unknown reset options {sorted(options)}; the vector environment takes none")
+            raise ValueError(f"unknown reset options {sorted(map(str, options))}; the vector environment takes none")
+        seed = None if seed is None else whole_number("seed", seed)
+        super().reset(seed=seed)
         self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
         for slot in range(self.num_envs):
             self._cells.reset(slot, slot)
@@ -238,6 +257,7 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, Flags, Flags, dict[str, Any]]:
         """Drive each robot for one control step, or begin its next episode if the last one is over."""
+        self._cells.check_open()
         if not self._ready:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         commands = check_commands(actions, self.num_envs)
@@ -257,6 +277,7 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         """One picture `[H, W, 3]` per environment, or None without a render mode."""
         if self.render_mode is None:
             return None
+        self._cells.check_open()
         return tuple(photograph(world.client, self._cells.fleet.arena) for world in self._cells.fleet.worlds)
 
     def close_extras(self, **_: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import TracebackType
@@ -11,6 +12,7 @@ import numpy as np
 import pybullet
 from numpy.typing import NDArray
 
+from sim.checks import real_number, real_rows, whole_number
 from sim.corral import Arena, Start, build_corral, draw_episode, find_arena
 from sim.robot import ACTUATORS, CONTROL_HZ, HEIGHT, MAX_SPEED, RADIUS, Body, Pose, find_body
 from sim.sensors import SENSOR_HEIGHT, SensorArray
@@ -20,7 +22,10 @@ TOUCH = 0.005
 
 
 class World:
-    """One pybullet DIRECT client (about 29 MB) with one arena and one robot. `close` it, or use it in `with`."""
+    """One pybullet DIRECT client (about 29 MB) with one arena and one robot. `close` it, or use it in `with`.
+
+    A world that is dropped without that disconnects its client as well.
+    """
 
     def __init__(self, arena: Arena, body: str) -> None:
         make_body = find_body(body)
@@ -28,6 +33,9 @@ class World:
         self.client = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:
             raise RuntimeError("pybullet has no client left for another robot; close some worlds or use fewer robots")
+        self._disconnect = weakref.finalize(self, pybullet.disconnect, self.client)
+        # At exit the process gives everything back by itself, and pybullet may be gone already.
+        self._disconnect.atexit = False
         try:
             build_corral(arena, self.client)
             self.body: Body = make_body(self.client)
@@ -37,9 +45,8 @@ class World:
 
     def close(self) -> None:
         """Disconnect the client; closing twice is fine."""
-        if self.client >= 0:
-            pybullet.disconnect(self.client)
-            self.client = -1
+        self._disconnect()
+        self.client = -1
 
     def __enter__(self) -> World:
         return self
@@ -98,10 +105,9 @@ class Fleet:
     """
 
     def __init__(self, size: int, arena: str | Arena = "default", body: str = "planar", seed: int = 0) -> None:
-        if size < 1:
-            raise ValueError(f"a fleet of {size} robots; expected at least 1")
+        size = whole_number("robots", size, 1)
         self.arena = find_arena(arena)
-        self.seed = seed
+        self.seed = whole_number("seed", seed)
         find_body(body)
         self._sensors = SensorArray(self.arena)
         self._walls = self.arena.walls
@@ -114,6 +120,11 @@ class Fleet:
         except BaseException:
             self.close()
             raise
+
+    @property
+    def closed(self) -> bool:
+        """Whether the clients are disconnected."""
+        return any(world.client < 0 for world in self.worlds)
 
     def reset(self, slot: int, episode: int) -> Start:
         """Begin `episode` in `slot`; returns its start."""
@@ -174,15 +185,16 @@ def _check_fit(arena: Arena) -> None:
 
 def control_steps(seconds: float) -> int:
     """Number of control steps in `seconds`. Raises `ValueError` unless there is at least one."""
-    steps = round(seconds * CONTROL_HZ) if math.isfinite(seconds) else 0
+    seconds = real_number("time", seconds)
+    steps = round(seconds * CONTROL_HZ) if math.isfinite(seconds * CONTROL_HZ) else 0
     if steps < 1:
         raise ValueError(f"{seconds} s; expected a finite time of at least one control step, {1 / CONTROL_HZ} s")
     return steps
 
 
 def check_commands(commands: object, batch: int) -> NDArray[np.float64]:
-    """`commands` as float64 `[batch, 2]`. Raises `ValueError` for another shape; values are not looked at."""
-    array = np.asarray(commands, dtype=np.float64)
+    """`commands` as float64 `[batch, 2]`. Raises `ValueError` for another shape, complex numbers and text."""
+    array = real_rows("commands", commands)
     if array.shape != (batch, len(ACTUATORS)):
         raise ValueError(f"commands have shape {array.shape}; expected {(batch, len(ACTUATORS))} (left, right wheel)")
     return array

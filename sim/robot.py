@@ -206,7 +206,7 @@ BODIES: dict[str, type[PlanarBody] | type[WheeledBody]] = {"planar": PlanarBody,
 
 def find_body(body: str) -> type[PlanarBody] | type[WheeledBody]:
     """Look a body up by name. Raises `ValueError` listing the known names."""
-    if body not in BODIES:
+    if not isinstance(body, str) or body not in BODIES:
         raise ValueError(f"unknown body {body!r}; expected one of {sorted(BODIES)}")
     return BODIES[body]
 

@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import whole_number
 from sim.corral import Arena, find_arena
 from sim.fleet import Fleet, State, check_commands, control_steps
 from sim.result import Rollout, Steps
@@ -88,10 +89,8 @@ def rollout(
             commands that are not finite or have the wrong shape, naming episode and step.
     """
     numbers = _check_episodes(episodes)
-    if robots < 1 or workers < 1:
-        raise ValueError(f"robots={robots}, workers={workers}: expected both to be at least 1")
-    if seed < 0:
-        raise ValueError(f"seed {seed}: expected 0 or more")
+    robots, workers = whole_number("robots", robots, 1), whole_number("workers", workers, 1)
+    seed = whole_number("seed", seed)
     find_body(body)
     task = _Task(policy, find_arena(arena), body, seed, control_steps(seconds), control_steps(dwell), robots, record)
     if executor is None and workers == 1:
@@ -114,15 +113,17 @@ def rollout(
 
 
 def _check_episodes(episodes: Iterable[int]) -> NDArray[np.int64]:
-    numbers = np.array(list(episodes))
-    if numbers.ndim != 1 or numbers.size == 0 or not np.issubdtype(numbers.dtype, np.integer):
+    try:
+        given = list(episodes)
+    except TypeError:
+        given = []
+    if not given:
         raise ValueError(f"episodes {episodes!r}; expected at least one whole number")
-    if numbers.min() < 0:
-        raise ValueError(f"episode {numbers.min()}; expected 0 or more")
+    numbers = np.array([whole_number("episode", number) for number in given], dtype=np.int64)
     values, counts = np.unique(numbers, return_counts=True)
     if counts.max() > 1:
         raise ValueError(f"episode {values[counts > 1][0]} is asked for {counts.max()} times; expected once")
-    return numbers.astype(np.int64)
+    return numbers
 
 
 def _spread(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.checks import real_rows
 from sim.sensors import LIGHT_MAX, SENSORS
 
 OBSTACLE = 0.22
@@ -39,7 +40,7 @@ class Teacher:
 
     def rule(self, sensors: NDArray[np.float64]) -> NDArray[np.int64]:
         """Index into `RULES` of the rule that fires, `[B]`. Raises `ValueError` unless `sensors` is `[B, 3]`."""
-        sensors = np.asarray(sensors, dtype=np.float64)
+        sensors = real_rows("sensors", sensors)
         if sensors.ndim != 2 or sensors.shape[1] != len(SENSORS):
             names = ", ".join(name for name, *_ in SENSORS)
             raise ValueError(f"sensors have shape {sensors.shape}; expected [B, {len(SENSORS)}] ({names})")

@@ -46,6 +46,7 @@ class Samples:
 
         `progress` is told the share that is done, if it takes long. Raises if a row has no observed sensor.
         """
+        demonstrations.check_names(space.schema)
         bins = space.bins(demonstrations.sensors)
         blind = (bins < 0).all(-1)
         if blind.any():

@@ -1,16 +1,19 @@
 """Ranges, bins and levels, against the definition in words; errors that name what is wrong."""
 
+import json
 import math
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from behaviours import Actuator, Schema, Sensor
-from torchvsa import ShapeError
+from behaviours import Actuator, Demonstrations, OneShot, Schema, Sensor, Space
+from behaviours.schema import quantile_edges
+from torchvsa import MAP, ShapeError
 
 
 def schema(low: float = 0, high: float = 4, levels: int = 3, beyond: Literal["error", "clip"] = "error") -> Schema:
@@ -114,3 +117,152 @@ def test_parts_that_make_no_sense() -> None:
 def test_a_schema_survives_plain_values() -> None:
     made = Schema([Sensor("a", 0, 1, "m", "clip"), Sensor("b", -1, 1)], [Actuator("c", 0, 2, "V", 5)])
     assert Schema.from_dict(made.to_dict()) == made
+
+
+@pytest.mark.parametrize("part", [Sensor, Actuator])
+@pytest.mark.parametrize(
+    ("low", "high", "words"),
+    [
+        (-1e308, 1e308, "'x' needs a finite range with low < high, whose width"),
+        (0, 10**400, "'x' needs a finite range"),
+        ("0", 1, "'x': low must be a real number; got '0'"),
+        (0, 1 + 0j, "'x': high must be a real number"),
+        (False, True, "'x': low must be a real number; got False"),
+        (0, None, "'x': high must be a real number; got None"),
+    ],
+)
+def test_bounds_are_finite_real_numbers(part: Any, low: Any, high: Any, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        part("x", low, high)
+
+
+@pytest.mark.parametrize("part", [Sensor, Actuator])
+def test_names_and_units_are_strings(part: Any) -> None:
+    with pytest.raises(ValueError, match="needs a name, a string; got 3"):
+        part(3, 0, 1)
+    with pytest.raises(ValueError, match="'x': unit must be a string; got 2"):
+        part("x", 0, 1, unit=2)
+
+
+def test_bounds_of_numpy_and_torch_are_kept_as_plain_numbers() -> None:
+    made = Sensor("x", cast(float, np.float32(0)), cast(float, torch.tensor(4.5)))
+    assert json.dumps([made.low, made.high]) == "[0.0, 4.5]"
+    assert (type(Sensor("x", cast(float, np.int64(1)), 2).low), Sensor("x", 1, 2).low) == (int, 1)
+
+
+@pytest.mark.parametrize("levels", [2.5, 2.0, True, np.bool_(True), "3", None, 2**31 + 1, 10**30, math.nan])
+def test_levels_are_a_whole_number(levels: Any) -> None:
+    with pytest.raises(ValueError, match=r"'x' needs at least 2 levels; got .*, expected a whole number from 2 to 2"):
+        Actuator("x", 0, 1, levels=levels)
+
+
+def test_levels_of_numpy_are_kept_as_a_plain_integer() -> None:
+    made = Actuator("x", 0, 1, levels=cast(int, np.int64(5)))
+    assert made == Actuator("x", 0, 1, levels=5)
+    assert type(made.levels) is int
+
+
+@pytest.mark.parametrize(
+    "edges", ["12", ["0.5"], [0.5j], [math.nan], [math.inf], [[0.5]], [None], [0.7, 0.2], [2.0], 0.5]
+)
+def test_edges_are_sorted_finite_numbers(edges: Any) -> None:
+    with pytest.raises(ValueError, match="sensor 'x': edges"):
+        Sensor("x", 0, 1, edges=edges)
+
+
+@pytest.mark.parametrize(("low", "high"), [(1e16, 1e16 + 4), (0, 5e-323), (-5e307, 5e307)])
+def test_ranges_in_which_floats_tell_no_bins_or_levels_apart(low: float, high: float) -> None:
+    made = Schema([Sensor("x", low, high)], [Actuator("y", 0, 1)])
+    with pytest.raises(ValueError, match=r"sensor 'x': 32 bins of the range .* cannot be told apart in float64"):
+        made.sensor_bins([[low]], 32)
+    with pytest.raises(ValueError, match=r"actuator 'y': 21 levels of the range .* cannot be told apart in float64"):
+        Actuator("y", low, high)
+
+
+@pytest.mark.parametrize(("low", "high"), [(1e15, 1e15 + 40), (0, 1e-300), (-1e305, 1e305), (1e300, 1.5e300)])
+@pytest.mark.parametrize("levels", [2, 3, 20])
+def test_levels_of_extreme_ranges_come_back(low: float, high: float, levels: int) -> None:
+    made = Schema([Sensor("x", low, high)], [Actuator("y", low, high, levels=levels)])
+    values = made.command_values(torch.arange(levels)[:, None])
+    assert values.isfinite().all()
+    assert made.command_levels(values).flatten().tolist() == list(range(levels))
+    bins = made.sensor_bins(values, levels - 1).flatten()
+    assert (bins - torch.arange(levels).clamp(max=levels - 2)).abs().max() <= 1
+    assert made.sensor_bins([[low], [high]], levels).flatten().tolist() == [0, levels - 1]
+
+
+TWO = Schema([Sensor("left", 0, 4), Sensor("right", 0, 4)], [Actuator("wheel", -1, 1)])
+
+
+def test_a_frame_has_the_columns_of_the_schema() -> None:
+    frame = pd.DataFrame({"left": [1.0, np.nan], "right": [3, 4]})
+    assert TWO.sensor_bins(frame, 4).tolist() == [[1, 3], [-1, 3]]
+    assert TWO.sensor_bins(frame.to_numpy(), 4).tolist() == [[1, 3], [-1, 3]]
+    assert TWO.command_levels(pd.DataFrame({"wheel": [0.0]})).tolist() == [[10]]
+    # Columns that are only counted have no names.
+    assert TWO.sensor_bins(pd.DataFrame([[1.0, 3.0]]), 4).tolist() == [[1, 3]]
+    space = Space(TWO, MAP(64))
+    behaviour = OneShot().fit(space, Demonstrations(frame[:1], [[0.5]]))
+    assert behaviour(frame[:1]).commands.tolist() == [[0.5]]
+    with pytest.raises(ValueError, match="order differs; expected left, right; got right, left"):
+        behaviour(frame[["right", "left"]])
+    with pytest.raises(ValueError, match=r"sensor readings .* missing: right; unknown: front; expected left, right"):
+        TWO.check_readings(frame.rename(columns={"right": "front"}))
+    with pytest.raises(ValueError, match=r"commands .* unknown: motor"):
+        TWO.command_levels(pd.DataFrame({"motor": [0.0]}))
+    with pytest.raises(ValueError, match="names of columns must all be strings"):
+        TWO.check_readings(frame.rename(columns={"right": 1}))
+
+
+@pytest.mark.parametrize(
+    "rows",
+    [
+        [[1.0, None]],
+        [[1.0, "2"]],
+        [["1", "2"]],
+        [[1.0, 2j]],
+        np.array([[1.0, 2j]]),
+        torch.tensor([[1.0, 2j]]),
+        pd.DataFrame({"left": ["near"], "right": ["far"]}),
+        [[1.0, 2.0], [1.0]],
+        [[1.0, 10**400]],
+        None,
+        object(),
+        np.array([["2020-01-01", "2020-01-02"]], dtype="datetime64[D]"),
+    ],
+)
+def test_readings_are_real_numbers(rows: Any) -> None:
+    with pytest.raises(ValueError, match=r"sensor readings (must|cannot)"):
+        TWO.check_readings(rows)
+    with pytest.raises(ValueError, match=r"(sensors|commands) (must|cannot)"):
+        Demonstrations(rows, rows)
+
+
+def test_missing_values_of_a_table_are_not_observed() -> None:
+    frame = pd.DataFrame({"left": pd.array([1, None], dtype="Int64"), "right": [True, False]})
+    np.testing.assert_array_equal(TWO.check_readings(frame), [[1, 1], [math.nan, 0]])
+    masked = np.ma.masked_array([[1.0, 2.0]], [[False, True]])
+    np.testing.assert_array_equal(TWO.check_readings(masked), [[1, math.nan]])
+
+
+def test_one_row_is_written_as_a_batch() -> None:
+    with pytest.raises(ShapeError, match=r"got shape \(2,\); write one row as a batch of one, \[row\]"):
+        TWO.check_readings([1.0, 2.0])
+
+
+def test_parts_of_a_schema_are_sensors_and_actuators() -> None:
+    with pytest.raises(ValueError, match="the sensors of a schema must be of type Sensor"):
+        Schema(cast(Any, ["left"]), [Actuator("wheel", 0, 1)])
+    with pytest.raises(ValueError, match="the actuators of a schema must be of type Actuator"):
+        Schema([Sensor("left", 0, 1)], cast(Any, [Sensor("wheel", 0, 1)]))
+
+
+def test_quantile_edges_of_readings_that_span_the_floats() -> None:
+    assert quantile_edges([-1.7e308, 1.7e308], 2).tolist() == [0.0]
+    for wrong in ([0.0, math.inf], [1j, 2.0], ["a", "b"]):
+        with pytest.raises(ValueError, match="readings must be"):
+            quantile_edges(wrong, 2)
+    with pytest.raises(ValueError, match="at least one bin; got 0"):
+        quantile_edges([0.0, 1.0], 0)
+    with pytest.raises(ValueError, match=r"the edges of 1,000,000,000,000 bins needs .* take fewer bins"):
+        quantile_edges([0.0, 1.0], 10**12)

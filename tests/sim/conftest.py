@@ -1,11 +1,7 @@
 from collections.abc import Iterator
 
-import pybullet
 import pytest
-
-
-def connected() -> list[int]:
-    return [client for client in range(256) if pybullet.getConnectionInfo(client)["isConnected"]]
+from clients import connected
 
 
 @pytest.fixture(autouse=True)

@@ -232,15 +232,15 @@ def test_a_policy_that_breaks_leaves_no_client() -> None:
         ({"arena": "maze"}, "unknown arena 'maze'"),
         ({"body": "flying"}, "unknown body 'flying'"),
         ({"episodes": []}, "expected at least one whole number"),
-        ({"episodes": [0.5]}, "expected at least one whole number"),
+        ({"episodes": [0.5]}, "episode 0.5; expected a whole number"),
         ({"episodes": [3, 1, 3]}, "episode 3 is asked for 2 times"),
         ({"episodes": [-2]}, "episode -2"),
         ({"seed": -1}, "seed -1"),
         ({"seconds": 0.0}, "0.0 s; expected"),
         ({"seconds": math.inf}, "inf s; expected"),
         ({"dwell": -1.0}, "-1.0 s; expected"),
-        ({"robots": 0}, "robots=0"),
-        ({"workers": 0}, "workers=0"),
+        ({"robots": 0}, "robots 0"),
+        ({"workers": 0}, "workers 0"),
     ],
 )
 def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:

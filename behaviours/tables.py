@@ -1,0 +1,135 @@
+"""Tables of numbers as they are given: tensors, arrays, lists, and data frames with names of columns."""
+
+from collections.abc import Sequence
+from numbers import Real
+from typing import Any
+
+import numpy as np
+import torch
+from jaxtyping import Float64, Int64
+from torch import Tensor
+
+
+def numbers(values: Any, what: str) -> Float64[Tensor, "..."]:
+    """`values` as a float64 tensor; a tensor of that type as it is, anything else copied.
+
+    Takes what NumPy takes, and whatever has `to_numpy`, such as a DataFrame. Booleans count as 0 and 1. Raises
+    `ValueError`, which begins with `what`, for complex numbers, text, None, and rows of unequal length.
+    """
+    if isinstance(values, Tensor):
+        if values.is_complex():
+            raise ValueError(f"{what} must be real numbers; got {_dtype(values)}")
+        return values.to(torch.float64)
+    array = _array(values, what)
+    if array.dtype.kind not in "biuf":
+        raise ValueError(f"{what} must be real numbers; got {_described(array)}")
+    return torch.from_numpy(np.array(array, dtype=np.float64, order="C"))
+
+
+def whole_numbers(values: Any, what: str) -> Int64[Tensor, "..."]:
+    """A copy of `values` as int64. Raises `ValueError`, which begins with `what`, for anything but whole numbers."""
+    if isinstance(values, Tensor):
+        rows = values.detach().to(torch.float64) if values.is_floating_point() else values.detach()
+        given = rows.cpu().numpy()
+    else:
+        given = _array(values, what)
+    if given.dtype.kind not in "iuf":
+        raise ValueError(f"{what} must be whole numbers; got {_described(given)}")
+    if given.dtype.kind != "i":
+        # NaN and infinity are no whole numbers either; 2^63 is the first that int64 cannot hold.
+        wrong = ~((np.floor(given) == given) & (given >= -(2.0**63)) & (given < 2.0**63))
+        if wrong.any():
+            raise ValueError(f"{what} must be whole numbers; got {given[wrong].flat[0]} in row {int(wrong.argmax())}")
+    whole = torch.from_numpy(np.array(given, dtype=np.int64, order="C"))
+    return whole.to(values.device) if isinstance(values, Tensor) else whole
+
+
+def mask(values: Any, rows: int, what: str) -> Tensor:
+    """`values` as booleans `[rows]`. Raises `ValueError`, which begins with `what`, for indices and other lengths."""
+    given = values if isinstance(values, Tensor) else _array(values, what)
+    if given.dtype not in (torch.bool, np.bool_):
+        raise ValueError(f"{what} must be one boolean per row, not indices or numbers; got {given.dtype}")
+    if given.shape != (rows,):
+        raise ValueError(f"{what} must be one boolean per row, [{rows}]; got shape {tuple(given.shape)}")
+    return given if isinstance(given, Tensor) else torch.from_numpy(np.array(given))
+
+
+def column_names(values: Any) -> tuple[str, ...] | None:
+    """The names of the columns of a data frame, or of a series; None where there are none, or numbers alone.
+
+    Raises `ValueError` if only some of the names are strings.
+    """
+    if isinstance(values, Tensor | np.ndarray | list | tuple) or not hasattr(values, "to_numpy"):
+        return None
+    names = list(values.columns) if hasattr(values, "columns") else [getattr(values, "name", None)]
+    return checked_names(names, "columns") if any(isinstance(name, str) for name in names) else None
+
+
+def checked_names(names: Any, what: str) -> tuple[str, ...]:
+    """`names` as a tuple of distinct strings. Raises `ValueError`, which begins with `what`, for anything else."""
+    if isinstance(names, str) or not isinstance(names, Sequence | np.ndarray):
+        raise ValueError(f"{what}: expected the names of the columns, a sequence of strings; got {names!r}")
+    if not all(isinstance(name, str) for name in names):
+        raise ValueError(f"{what}: the names of columns must all be strings; got {list(names)}")
+    if len(set(names)) < len(names):
+        raise ValueError(f"{what}: the names of columns must differ; got {', '.join(names)}")
+    return tuple(str(name) for name in names)
+
+
+def compare_names(given: Sequence[str], expected: Sequence[str], what: str, whose: str = "the schema") -> None:
+    """Raise `ValueError`, naming the columns, unless `given` are the `expected` names in the same order."""
+    if tuple(given) == tuple(expected):
+        return
+    missing = [name for name in expected if name not in given]
+    unknown = [name for name in given if name not in expected]
+    problems = [f"missing: {', '.join(missing)}"] * bool(missing) + [f"unknown: {', '.join(unknown)}"] * bool(unknown)
+    raise ValueError(
+        f"the columns of the {what} are not those of {whose}; {'; '.join(problems) or 'their order differs'}; "
+        f"expected {', '.join(expected)}; got {', '.join(given)}"
+    )
+
+
+def _array(values: Any, what: str) -> np.ndarray[Any, Any]:
+    """`values` as NumPy reads them, with objects that are all numbers as floats."""
+    try:
+        if isinstance(values, np.ndarray):
+            array = values
+        elif hasattr(values, "to_numpy"):
+            array = _frame_values(values)
+        else:
+            array = np.array(values)
+        return _plain(array, what)
+    except (TypeError, OverflowError, RuntimeError) as error:
+        raise ValueError(f"{what} cannot be read as numbers: {error}") from error
+    except ValueError as error:
+        # NumPy's words for rows of unequal length, or our own.
+        raise ValueError(str(error) if what in str(error) else f"{what} cannot be read as numbers: {error}") from error
+
+
+def _frame_values(values: Any) -> np.ndarray[Any, Any]:
+    try:
+        # Missing values of pandas' own types become NaN.
+        return np.asarray(values.to_numpy(na_value=np.nan))
+    except TypeError:
+        return np.asarray(values.to_numpy())
+
+
+def _plain(array: np.ndarray[Any, Any], what: str) -> np.ndarray[Any, Any]:
+    """Masked values as NaN, and objects as floats if each of them is a real number."""
+    if isinstance(array, np.ma.MaskedArray):
+        array = np.ma.filled(array.astype(np.float64), np.nan)
+    if array.dtype.kind != "O":
+        return array
+    for place, value in np.ndenumerate(array):
+        if not isinstance(value, Real | np.bool_):
+            row = f" in row {place[0]}" if place else ""
+            raise ValueError(f"{what} must be real numbers (NaN where there is none); got {value!r}{row}")
+    return array.astype(np.float64)
+
+
+def _dtype(values: Tensor) -> str:
+    return str(values.dtype).removeprefix("torch.")
+
+
+def _described(array: np.ndarray[Any, Any]) -> str:
+    return f"text, such as {str(array.flat[0])!r}" if array.dtype.kind in "US" and array.size else str(array.dtype)
