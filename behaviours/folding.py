@@ -53,10 +53,12 @@ class Folded(nn.Module):
         super().__init__()
         self.vsa = vsa
         program, known, items = (_scaled_to_one(x) for x in (program, known, items))
+        # A product of the largest program with items that are sums may pass int32.
+        wide = program.to(torch.int64) if program.dtype == torch.int32 else program
         tables = {
             "program": program,
             "known": known,
-            "rows": vsa.unbind(program, items),
+            "rows": vsa.unbind(wide, items),
             "item_lengths": norms(items),
             "known_length": norms(known),
         }
@@ -67,9 +69,9 @@ class Folded(nn.Module):
         self.digital = whole and not torch.compiler.is_compiling()
         if self.digital:
             votes = torch.cat([signed(tables["rows"]), signed(known)[None]])
-            # One digit more than bytes, since digits are signed.
-            size = max(signed(program).element_size(), votes.element_size())
-            tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64), size + 1)
+            # Two digits more than bytes: one since digits are signed, one for items that are sums.
+            size = max(signed(program).element_size(), signed(known).element_size())
+            tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64), min(size + 2, 8))
             square, tables["square_weights"] = _digits(signed(program).to(torch.int64)[None] ** 2, min(2 * size + 1, 8))
             tables["square"] = torch.cat([square, torch.ones_like(square[:1])])
         for name, table in tables.items():

@@ -240,7 +240,7 @@ def _change_tensor(rng: random.Random, tensor: Tensor) -> Tensor:
         case 0:
             return real.to(rng.choice([*types, torch.complex64]))
         case 1 | 2 | 3 if tensor.numel():
-            changed = tensor.clone()
+            changed = tensor.clone(memory_format=torch.contiguous_format)
             if tensor.is_floating_point() or tensor.is_complex():
                 value = rng.choice([math.nan, math.inf, -math.inf, 1e38, 1e-40, 0.3, 0.0, -1.0])
             elif tensor.dtype == torch.bool:
