@@ -37,6 +37,16 @@ class VSA(ABC):
     name: str
     elementwise: ClassVar[bool] = True
     """Whether `bind` acts on every dimension by itself."""
+    commutative: ClassVar[bool] = True
+    """Whether `bind(a, b)` equals `bind(b, a)`."""
+    bilinear: ClassVar[bool] = True
+    """Whether `bind` is linear in each argument, so that it distributes over raw accumulators."""
+    self_inverse: ClassVar[bool] = False
+    """Whether `bind` with the same key undoes itself."""
+    negatable: ClassVar[bool] = True
+    """Whether hypervectors have a `negative`."""
+    sparse: ClassVar[bool] = False
+    """Whether few elements of a hypervector differ from 0."""
     breaks_ties: bool = False
     """Whether `bundle` needs the voters themselves, to decide split votes, and not just their sum."""
 
@@ -105,6 +115,22 @@ class VSA(ABC):
         """Turn a raw accumulator into a hypervector of this architecture."""
 
     # -- what follows from it --------------------------------------------------------------------------
+
+    def negative(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """The hypervector that is as unlike `x` as can be: similarity -1."""
+        if not self.negatable:
+            raise ValueError(f"{self.name} has no negative hypervectors")
+        self.check(x, "x")
+        return ~x if x.dtype == torch.bool else -x
+
+    @property
+    def frequencies(self) -> int | None:
+        """How many angles `from_angles` takes; None for an architecture without a spectrum."""
+        return None
+
+    def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
+        """The hypervector whose spectrum has these angles, and magnitude 1: what `FractionalPower` is made of."""
+        raise ValueError(f"{self.name} has no spectrum; fractional powers need FHRR or HRR")
 
     def permute(
         self, x: Shaped[Tensor, "*#batch d"], shifts: int | Int[Tensor, "*#batch"]

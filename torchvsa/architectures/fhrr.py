@@ -58,6 +58,15 @@ class FHRR(VSA):
         """Scale every element to length 1; zero stays zero."""
         return divide(raw, raw.abs())
 
+    @property
+    def frequencies(self) -> int:
+        """See `VSA.frequencies`: one for each element."""
+        return self.dim
+
+    def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
+        """See `VSA.from_angles`: the elements themselves."""
+        return torch.polar(torch.ones_like(angles), angles).to(self.dtype)
+
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
         return bool(((x.abs() - 1).abs() < 1e-3).all())
 

@@ -1,7 +1,7 @@
 """Holographic Reduced Representations."""
 
 import torch
-from jaxtyping import Shaped
+from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
@@ -65,6 +65,17 @@ class HRR(VSA):
         """Scale to length 1; zero stays zero."""
         rows, lengths, _ = in_range(raw)
         return divide(rows, lengths[..., None].to(rows.dtype))
+
+    @property
+    def frequencies(self) -> int:
+        """See `VSA.frequencies`: those strictly between 0 and d / 2, whose angles are free in a real vector."""
+        return (self.dim - 1) // 2
+
+    def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
+        """See `VSA.from_angles`: the inverse Fourier transform, of length 1."""
+        ends = torch.zeros_like(angles[..., :1]) if angles.shape[-1] else angles.new_zeros(*angles.shape[:-1], 1)
+        whole = torch.cat([ends, angles] + ([ends] if self.dim % 2 == 0 else []), -1)
+        return torch.fft.irfft(torch.polar(torch.ones_like(whole), whole), n=self.dim).to(self.dtype)
 
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
         # Ten standard deviations: no element of a drawn hypervector is ever so far from 0.

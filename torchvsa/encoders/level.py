@@ -1,0 +1,47 @@
+"""Codes whose similarity falls linearly with distance."""
+
+from typing import Any
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from torchvsa.architectures import VSA
+from torchvsa.encoders.base import Binned, whole
+
+
+class Level(Binned):
+    """Level codes: similarity falls linearly with the distance in bins, 1 - |i - j| / span, and is about 0 from there.
+
+    Every `span` bins there is an independent random hypervector; between two of them, elements change over one by
+    one, always in the same random order (with an order of its own for each stretch, codes `span` apart would still
+    share up to a quarter of their elements). By default the span is the whole range, so that the two ends are
+    independent and the kernel is 1 - |x - y|. `span=1` is the lookup table.
+
+    Source: Rachkovskij et al. 2005; Kleyko et al. 2018 for the linear kernel.
+    """
+
+    name = "level"
+
+    def __init__(self, vsa: VSA, bins: int, span: int | None = None, seed: int | None = None) -> None:
+        self.span = None if span is None else whole("span", span)
+        super().__init__(vsa, bins, seed)
+
+    def config(self) -> dict[str, Any]:
+        """See `Part.config`."""
+        return super().config() | {"span": self.span}
+
+    def _codes(self, generator: torch.Generator | None) -> Shaped[Tensor, "bins d"]:
+        span = self.span or max(self.bins - 1, 1)
+        segments = -(-(self.bins - 1) // span) if self.bins > 1 else 0
+        anchors = self.vsa.random(segments + 1, generator=generator)
+        order = torch.randperm(self.vsa.dim, generator=generator).to(anchors.device)
+        codes = []
+        for bin_ in range(self.bins):
+            segment, step = divmod(bin_, span)
+            if step == 0:
+                codes.append(anchors[segment])
+            else:
+                # Integer comparison: exactly d · step / span, rounded up, elements have changed over.
+                codes.append(torch.where(order * span < self.vsa.dim * step, anchors[segment + 1], anchors[segment]))
+        return torch.stack(codes)

@@ -1,0 +1,66 @@
+"""Records that bind what the sensors read."""
+
+from collections.abc import Mapping
+from functools import reduce
+
+import torch
+from jaxtyping import Bool, Int64, Shaped
+from torch import Tensor
+
+from torchvsa.encoders.part import Layout
+from torchvsa.encoders.record import Record, places
+
+
+class Product(Record):
+    """The product of the role-bound values. Its kernel **multiplies** the kernels of the values.
+
+    Where binding commutes, a product of roles and shared values would not say which sensor had which value; the i-th
+    role-bound value is therefore permuted i times. Where binding does not act element by element a rotation can be
+    moved out of the product (circular convolution commutes with it), so that the elements of each sensor but the first
+    take a random order instead.
+    """
+
+    name = "product"
+    arrangement: Tensor
+
+    @property
+    def _reorders(self) -> bool:
+        return not self.vsa.elementwise
+
+    def own_layout(self) -> Layout:
+        """`roles` `[n, d]`; with bindings that are not element-wise an order of the dimensions per sensor."""
+        layout = super().own_layout()
+        shape = self.sensors, self.vsa.dim
+        return layout | {"arrangement": (torch.int64, shape)} if self._reorders else layout
+
+    def check(self) -> None:
+        """See `Part.check`."""
+        super().check()
+        if self._reorders:
+            ordered = self.arrangement.sort(-1).values
+            if not (ordered == torch.arange(self.vsa.dim, device=ordered.device)).all():
+                raise ValueError("arrangement must hold an order of all dimensions for each sensor")
+
+    def _arrange(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
+        if not self._reorders:
+            return {}
+        orders = [torch.randperm(self.vsa.dim, generator=generator) for _ in range(self.sensors - 1)]
+        return {"arrangement": torch.stack([torch.arange(self.vsa.dim), *orders])}
+
+    def _bound(self, roles: Shaped[Tensor, "n 1 d"], codes: Shaped[Tensor, "#n k d"]) -> Shaped[Tensor, "n k d"]:
+        bound = super()._bound(roles, codes)
+        if self._reorders:
+            return torch.stack([entries[:, order] for entries, order in zip(bound, self.arrangement, strict=True)])
+        return self.vsa.permute(bound, torch.arange(self.sensors, device=roles.device)[:, None])
+
+    def _absent(self, like: Shaped[Tensor, "..."]) -> Shaped[Tensor, "d"]:
+        return self.vsa.identity().to(like)
+
+    def _join(self, table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
+        return self.vsa.bind_entries(table, places(table, cells))
+
+    def _combine(
+        self, bound: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
+    ) -> Shaped[Tensor, "batch d"]:
+        known = torch.where(observed[..., None], bound, self._absent(bound))
+        return reduce(self.vsa.bind, known.unbind(1))

@@ -1,0 +1,21 @@
+"""Encoders by name."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from torchvsa.architectures import VSA
+from torchvsa.encoders.base import Encoder, ValueEncoder
+from torchvsa.registry import Registry
+
+VALUE_ENCODERS: Registry[type[ValueEncoder]] = Registry("value encoder")
+ENCODERS: Registry[type[Encoder]] = Registry("encoder")
+
+
+def value_encoder(config: Mapping[str, Any], vsa: VSA) -> ValueEncoder:
+    """The value encoder that a `config()` describes, as a plan."""
+    return VALUE_ENCODERS.find(config.get("name")).from_config(config, vsa)
+
+
+def encoder(config: Mapping[str, Any], vsa: VSA) -> Encoder:
+    """The encoder that a `config()` describes, as a plan."""
+    return ENCODERS.find(config.get("name")).from_config(config, vsa)

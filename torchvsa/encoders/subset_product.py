@@ -1,0 +1,58 @@
+"""Records that bind another few of the sensors in each dimension."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from torchvsa.encoders.base import ValueEncoder, whole
+from torchvsa.encoders.part import Layout
+from torchvsa.encoders.product import Product
+
+
+class SubsetProduct(Product):
+    """The product over a random subset of the sensors, another one for each dimension of the hypervector.
+
+    Each dimension sees an interaction of at most `subset` sensors (of any number of them, by default), so that
+    sensors without a say disturb only the dimensions that hold them. Needs an architecture that binds element by
+    element.
+    """
+
+    name = "subset_product"
+    chosen: Tensor
+
+    def __init__(
+        self,
+        values: ValueEncoder | Sequence[ValueEncoder],
+        sensors: int | None = None,
+        subset: int | None = None,
+        seed: int | None = None,
+    ) -> None:
+        self.subset = None if subset is None else whole("subset", subset)
+        super().__init__(values, sensors, seed)
+
+    def own_layout(self) -> Layout:
+        """`roles` `[n, d]` and `chosen` `[n, d]`, which sensors each dimension sees."""
+        if not self.vsa.elementwise:
+            raise ValueError(f"a subset of sensors per dimension needs element-wise binding, which {self.vsa} lacks")
+        return super().own_layout() | {"chosen": (torch.bool, (self.sensors, self.vsa.dim))}
+
+    def config(self) -> dict[str, Any]:
+        """See `Part.config`."""
+        return super().config() | {"subset": self.subset}
+
+    def check(self) -> None:
+        """See `Part.check`."""
+        self.vsa.check_codes(self.roles, "roles")
+
+    def _arrange(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
+        most = min(self.subset or self.sensors, self.sensors)
+        sizes = torch.randint(1, most + 1, (self.vsa.dim,), generator=generator)
+        ranks = torch.stack([torch.randperm(self.sensors, generator=generator) for _ in range(self.vsa.dim)], -1)
+        return {"chosen": ranks < sizes}
+
+    def _bound(self, roles: Shaped[Tensor, "n 1 d"], codes: Shaped[Tensor, "#n k d"]) -> Shaped[Tensor, "n k d"]:
+        bound = super()._bound(roles, codes)
+        return torch.where(self.chosen[:, None], bound, self._absent(bound))
