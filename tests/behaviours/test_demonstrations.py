@@ -228,9 +228,9 @@ FIELDS: dict[str, tuple[Callable[[dict[str, torch.Tensor]], Any], Any, str]] = {
     "NaN commands": (lambda t: t["commands"].fill_(math.nan), ABOUT, "commands has nan"),
     "no episodes": (lambda t: t.pop("episodes"), ABOUT, "expected the tensors sensors, commands, episodes"),
     "another tensor": (lambda t: t.update(more=torch.ones(1)), ABOUT, "expected the tensors"),
-    "a list": (len, [3], "its description must hold 'rows'"),
-    "null": (len, None, "its description must hold 'rows'"),
-    "unknown field": (len, ABOUT | {"robot": 1}, "its description must hold 'rows'"),
+    "a list": (len, [3], "its description must hold nothing but rows"),
+    "null": (len, None, "its description must hold nothing but rows"),
+    "unknown field": (len, ABOUT | {"robot": 1}, "its description must hold nothing but rows"),
     "other rows": (len, {"rows": 4}, "rows is 4"),
     "rows of another type": (len, {"rows": True}, "rows is True"),
     "names of another type": (len, {"rows": 3, "sensor_names": "lr"}, "sensor_names must be a list"),
@@ -263,6 +263,7 @@ def test_a_file_whose_description_is_nested_without_end(tmp_path: Path) -> None:
 
 
 def test_files_without_names_still_load(tmp_path: Path) -> None:
-    again = Demonstrations.load(rewritten(tmp_path / "shown", len, {"rows": 3}))
-    assert len(again) == 3
-    assert (again.sensor_names, again.actuator_names) == (None, None)
+    for about in ({"rows": 3}, {}):
+        again = Demonstrations.load(rewritten(tmp_path / "shown", len, about))
+        assert len(again) == 3
+        assert (again.sensor_names, again.actuator_names) == (None, None)
