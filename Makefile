@@ -1,11 +1,11 @@
 # `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs;
-# `make bench` measures speed beside peers.
+# `make bench` measures speed beside peers; `make fuzz` loads 200,000 damaged files.
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: run test lint bench
+.PHONY: run test lint bench fuzz
 
 run: $(INSTALLED)
 	$(BIN)/python -m experiments.corral
@@ -16,6 +16,9 @@ test: $(INSTALLED) lint
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.memory
+
+fuzz: $(INSTALLED)
+	$(BIN)/python tests/helpers/mutants.py --count 200000
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

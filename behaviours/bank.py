@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, cast
 
 from torch import nn
 
@@ -9,9 +10,10 @@ from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import OneShot, Rule
 from behaviours.progress import Progress, silent
+from behaviours.remembering import RememberingSpace
 from behaviours.report import LearningReport
 from behaviours.space import Space
-from behaviours.storage import load_tensors, save_tensors
+from behaviours.storage import Layout, check_layout, load_tensors, naming, save_tensors
 
 
 class BehaviourBank(nn.Module):
@@ -23,7 +25,9 @@ class BehaviourBank(nn.Module):
     def __init__(self, space: Space) -> None:
         super().__init__()
         self.space = space
-        self.behaviours = nn.ModuleDict()
+        # By number, since modules cannot have every name that a behaviour can.
+        self._names: list[str] = []
+        self._behaviours = nn.ModuleList()
 
     def learn(
         self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = silent
@@ -33,6 +37,7 @@ class BehaviourBank(nn.Module):
         An existing behaviour of that name is replaced. Says what the rule did with the samples; `progress` is called
         with the share of the work that is done.
         """
+        check_name(name)
         behaviour = (rule or OneShot()).fit(self.space, demonstrations, progress)
         self.add(name, behaviour)
         return behaviour.report
@@ -49,24 +54,34 @@ class BehaviourBank(nn.Module):
         return behaviour.report
 
     def add(self, name: str, behaviour: Behaviour) -> None:
-        """Keep a behaviour that was learned over this bank's space."""
-        if not name or "." in name:
-            raise ValueError(f"a behaviour's name is not empty and has no dot; got {name!r}")
+        """Keep a behaviour that was learned over this bank's space, or over one with equal codebooks.
+
+        What comes from an equal space (a copy, another process) answers by this bank's codebooks from now on. Raises
+        `ValueError` for a behaviour over other codebooks.
+        """
+        check_name(name)
+        if not self.space.same_as(behaviour.space):
+            raise ValueError(
+                f"behaviour {name!r} was learned over another space (other sensors, codes or seed); its program "
+                "cannot join this bank"
+            )
         if behaviour.space is not self.space:
-            raise ValueError(f"behaviour {name!r} was learned over another space; its program cannot join this bank")
-        self.behaviours[name] = behaviour
+            behaviour = behaviour.over(self.space)
+        if name in self._names:
+            self._behaviours[self._names.index(name)] = behaviour
+        else:
+            self._names.append(name)
+            self._behaviours.append(behaviour)
 
     @property
     def names(self) -> list[str]:
         """The names, in the order in which they were learned."""
-        return list(self.behaviours)
+        return list(self._names)
 
     def __getitem__(self, name: str) -> Behaviour:
-        if name not in self.behaviours:
+        if name not in self._names:
             raise KeyError(f"no behaviour {name!r} in this bank; it holds {', '.join(self.names) or 'none'}")
-        behaviour = self.behaviours[name]
-        assert isinstance(behaviour, Behaviour)
-        return behaviour
+        return cast(Behaviour, self._behaviours[self._names.index(name)])
 
     def __contains__(self, name: object) -> bool:
         return name in self.names
@@ -75,32 +90,77 @@ class BehaviourBank(nn.Module):
         return iter(self.names)
 
     def __len__(self) -> int:
-        return len(self.behaviours)
+        return len(self._names)
 
     def save(self, path: str | Path) -> Path:
-        """Write codebooks and programs to one safetensors file, whole or not at all."""
-        tensors = {f"space.{key}": value for key, value in self.space.state_dict().items()}
-        for name in self:
+        """Write codebooks and programs to one safetensors file, whole or not at all.
+
+        The same bank gives the same bytes. Raises `ValueError` for what `load` would refuse: programs that are not
+        finite, codebooks of another type than the architecture's (after `.half()`).
+        """
+        space = self.space.config()
+        tensors = {f"space.{key}": value for key, value in self.space.codebooks().items()}
+        check_layout(tensors, _codebooks(space))
+        for number, name in enumerate(self):
             behaviour = self[name]
+            with naming(f"behaviour {name!r}"):
+                behaviour.check()
             parts = {"program": behaviour.program, "known": behaviour.known, "results": behaviour.results}
-            tensors |= {f"behaviours.{name}.{key}": tensor for key, tensor in parts.items()}
-        about = {
-            "space": self.space.config(),
-            "behaviours": {name: self[name].report.to_dict() for name in self},
-        }
-        return save_tensors(path, "bank", tensors, about)
+            tensors |= {f"behaviours.{number}.{key}": tensor for key, tensor in parts.items()}
+        behaviours = [{"name": name, "report": self[name].report.to_dict()} for name in self]
+        return save_tensors(path, "bank", tensors, {"space": space, "behaviours": behaviours})
 
     @classmethod
     def load(cls, path: str | Path) -> "BehaviourBank":
-        """Read what `save` wrote."""
+        """Read what `save` wrote.
+
+        Everything is compared with the description before anything is made. Raises `ValueError` that names the file
+        and what in it is wrong.
+        """
         tensors, about = load_tensors(path, "bank")
-        try:
-            space = Space.from_config(about["space"])
-            space.load_state_dict({k.removeprefix("space."): v for k, v in tensors.items() if k.startswith("space.")})
+        with naming(f"{path} does not describe a bank of this version"):
+            with naming("behaviours"):
+                described = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
+                for name, _ in described:
+                    check_name(name)
+                if len({name for name, _ in described}) < len(described):
+                    raise ValueError("two of them have the same name")
+            with naming("space"):
+                codebooks = _codebooks(about["space"])
+                check_layout(
+                    {name: tensor for name, tensor in tensors.items() if not name.startswith("behaviours.")}, codebooks
+                )
+            parts = {f"behaviours.{number}.{key}" for number in range(len(described)) for key in _PARTS}
+            if wrong := sorted(parts ^ (tensors.keys() - codebooks.keys())):
+                raise ValueError(f"tensor {wrong[0]!r} is {'missing' if wrong[0] in parts else 'not described'}")
+            with naming("space"):
+                space = _kind(about["space"]).from_config(
+                    about["space"], {name.removeprefix("space."): tensors[name] for name in codebooks}
+                )
             bank = cls(space)
-            for name, report in about["behaviours"].items():
-                parts = (tensors[f"behaviours.{name}.{key}"] for key in ("program", "known", "results"))
-                bank.add(name, Behaviour(space, *parts, report=LearningReport(**report)))
-        except (KeyError, TypeError, ValueError, AttributeError, RuntimeError) as error:
-            raise ValueError(f"{path} does not describe a bank of this version: {error}") from error
+            for number, (name, report) in enumerate(described):
+                with naming(f"behaviour {name!r}"):
+                    stored = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
+                    behaviour = Behaviour(space, *stored, report=report)
+                bank.add(name, behaviour)
         return bank
+
+
+_PARTS = ("program", "known", "results")
+_SPACES: dict[str, type[Space]] = {"space": Space, "remembering": RememberingSpace}
+
+
+def _kind(config: dict[str, Any]) -> type[Space]:
+    if config["kind"] not in _SPACES:
+        raise ValueError(f"there is no space of kind {config['kind']!r}; there are {', '.join(_SPACES)}")
+    return _SPACES[config["kind"]]
+
+
+def _codebooks(config: dict[str, Any]) -> Layout:
+    return {f"space.{name}": wanted for name, wanted in _kind(config).layout(config).items()}
+
+
+def check_name(name: object) -> None:
+    """Raise `ValueError` unless `name` can name a behaviour: any text but the empty one."""
+    if not isinstance(name, str) or not name:
+        raise ValueError(f"a behaviour's name is a text that is not empty; got {name!r}")

@@ -7,11 +7,11 @@ from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
 from behaviours.folding import Folded
-from behaviours.memory import ResultMemory
+from behaviours.memory import ResultMemory, check_levels
 from behaviours.recall import Recall, asked_once, scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
-from torchvsa import ShapeError
+from torchvsa import VSA, ShapeError
 from torchvsa.blocks import by_blocks
 from torchvsa.exact import is_integer, norms, signed
 
@@ -38,8 +38,7 @@ class Behaviour(nn.Module):
     ) -> None:
         super().__init__()
         for name, vector in (("program", program), ("known", known)):
-            if vector.shape != (space.vsa.dim,):
-                raise ShapeError(f"{name} must be one hypervector [{space.vsa.dim}]; got shape {tuple(vector.shape)}")
+            _check_vector(space.vsa, name, vector)
         self.space = space
         self.report = report
         if isinstance(program, nn.Parameter):
@@ -48,7 +47,21 @@ class Behaviour(nn.Module):
             self.register_buffer("program", program)
         self.register_buffer("known", known)
         self.memory = ResultMemory(space, results)
-        self._folding: tuple[tuple[int, ...], tuple[Tensor, ...], Folded] | None = None
+        self._folding: tuple[Tensor, Folded] | None = None
+
+    def check(self) -> None:
+        """Raise `ValueError` naming what could not be kept: see `BehaviourBank.save`."""
+        for name in ("program", "known"):
+            _check_vector(self.space.vsa, name, getattr(self, name))
+        check_levels(self.space.schema, self.results)
+
+    def over(self, space: Space) -> "Behaviour":
+        """The same behaviour over a space with equal codebooks, on its device."""
+        device = space.results.codes.device
+        program = self.program.detach().to(device)
+        if isinstance(self.program, nn.Parameter):
+            program = nn.Parameter(program)
+        return Behaviour(space, program, self.known.to(device), self.results.to(device), self.report)
 
     @property
     def results(self) -> Int64[Tensor, "k m"]:
@@ -78,18 +91,23 @@ class Behaviour(nn.Module):
         return folded.recall(folded.products(conditions), self.memory.commands)
 
     def _folded(self) -> Folded:
-        """The folded program: as long as no tensor that it is made of changes, the same one."""
-        parts = (self.program, self.known, self.memory.items)
-        if torch.compiler.is_compiling() or any(part.requires_grad or part.is_inference() for part in parts):
-            return Folded(self.space.vsa, *parts)
-        versions = tuple(part._version for part in parts)
+        """The folded program, kept for as long as what it was made of has the same values."""
+        program, known, items = self.program, self.known, self.memory.current_items()
+        parts = program, known, items
         if (
-            self._folding is None
-            or self._folding[0] != versions
-            or any(mine is not part for mine, part in zip(self._folding[1], parts, strict=True))
+            torch.compiler.is_compiling()
+            or program.device.type != "cpu"  # comparing values would wait for it
+            or any(part.requires_grad for part in parts)
         ):
-            self._folding = versions, parts, Folded(self.space.vsa, *parts)
-        return self._folding[2]
+            return Folded(self.space.vsa, *parts)
+        if self._folding is not None:
+            kept_items, folded = self._folding
+            if _same(folded.program, program) and _same(folded.known, known) and _same(kept_items, items):
+                return folded
+        # Copies: whoever writes into the behaviour's own tensors, by whatever way, is found out by comparing.
+        copies = [part.clone() for part in parts]
+        self._folding = copies[2], Folded(self.space.vsa, *copies)
+        return self._folding[1]
 
     def scores(self, readings: Any) -> Float[Tensor, "batch k"]:
         """What recall compares: how strongly each of `results` is answered, `<unbind(program, c), item> / |item|`.
@@ -141,3 +159,21 @@ class Behaviour(nn.Module):
         vsa = self.space.vsa
         program = vsa.normalize(self.program.detach())
         return Behaviour(self.space, program, vsa.normalize(self.known), self.results, self.report)
+
+
+_REAL = (torch.int8, torch.int32, torch.int64, torch.float32, torch.float64)
+
+
+def _check_vector(vsa: VSA, name: str, vector: Tensor) -> None:
+    """Raise unless `vector` can be a program, or a sum of conditions, of this architecture."""
+    if vector.shape != (vsa.dim,):
+        raise ShapeError(f"{name} must be one hypervector [{vsa.dim}]; got shape {tuple(vector.shape)}")
+    kinds = (torch.complex64, torch.complex128) if vsa.dtype.is_complex else (*_REAL, vsa.dtype)
+    if vector.dtype not in kinds:
+        raise ValueError(f"{name} of {vsa} cannot be {vector.dtype}; it is one of {', '.join(map(str, kinds))}")
+    if not vector.isfinite().all():
+        raise ValueError(f"{name} holds values that are not finite")
+
+
+def _same(kept: Tensor, now: Tensor) -> bool:
+    return kept.dtype == now.dtype and kept.device == now.device and torch.equal(kept, now)

@@ -52,6 +52,7 @@ class Folded(nn.Module):
     ) -> None:
         super().__init__()
         self.vsa = vsa
+        program, known, items = (_scaled_to_one(x) for x in (program, known, items))
         tables = {
             "program": program,
             "known": known,
@@ -59,13 +60,17 @@ class Folded(nn.Module):
             "item_lengths": norms(items),
             "known_length": norms(known),
         }
-        whole = vsa.integer and vsa.elementwise and all(is_integer(x) for x in (program, known, items))
+        # Squares of wider integers would not fit; in float64 they are as exact as its 53 bits.
+        whole = vsa.integer and vsa.elementwise
+        whole = whole and all(is_integer(x) and x.element_size() <= 4 for x in (program, known, items))
         # How many digits it takes depends on the values, which no graph may look at.
         self.digital = whole and not torch.compiler.is_compiling()
         if self.digital:
             votes = torch.cat([signed(tables["rows"]), signed(known)[None]])
-            tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64))
-            square, tables["square_weights"] = _digits(signed(program).to(torch.int64)[None] ** 2)
+            # One digit more than bytes, since digits are signed.
+            size = max(signed(program).element_size(), votes.element_size())
+            tables["linear"], tables["linear_weights"] = _digits(votes.to(torch.int64), size + 1)
+            square, tables["square_weights"] = _digits(signed(program).to(torch.int64)[None] ** 2, min(2 * size + 1, 8))
             tables["square"] = torch.cat([square, torch.ones_like(square[:1])])
         for name, table in tables.items():
             self.register_buffer(name, table, persistent=False)
@@ -90,10 +95,30 @@ class Folded(nn.Module):
         return Recall(commands[match.index], match.similarity, match.margin, familiarity.to(torch.float32))
 
 
-def _digits(x: Int64[Tensor, "rows d"]) -> tuple[Int8[Tensor, "rows_digits d"], Float64[Tensor, "digits"]]:
-    """Each row as the rows of its digits in base 256, lowest first, and the weights of the digits."""
+def _scaled_to_one(x: Shaped[Tensor, "*rows d"]) -> Shaped[Tensor, "*rows d"]:
+    """Floats, each row in units of a power of two, so that no square is too large or too small for its type.
+
+    Cosines do not depend on it, and a power of two changes no digit. Integers, and tensors in a graph, are returned as
+    they are.
+    """
+    if is_integer(x) or torch.compiler.is_compiling():
+        return x
+    if x.dtype in (torch.float16, torch.bfloat16):
+        x = x.to(torch.float32)
+    largest = x.detach().abs().amax(-1, keepdim=True)
+    unit = torch.where(
+        (largest > 0) & largest.isfinite(), torch.ldexp(torch.ones_like(largest), largest.frexp().exponent - 1), 1.0
+    )
+    return x / unit
+
+
+def _digits(x: Int64[Tensor, "rows d"], most: int) -> tuple[Int8[Tensor, "rows_digits d"], Float64[Tensor, "digits"]]:
+    """Each row as the rows of its digits in base 256, lowest first, and the weights of the digits.
+
+    On a CPU there are as many digits as the largest number has, elsewhere `most`: to look at numbers there would wait.
+    """
     digits = []
-    while not digits or x.any():
+    while len(digits) < most and (not digits or x.device.type != "cpu" or x.any()):
         low = (x + 128) % 256 - 128
         digits.append(low.to(torch.int8))
         x = (x - low) // 256

@@ -1,12 +1,14 @@
 """The clean-up memory of results, and the commands that each of them stands for."""
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor, nn
 
-from behaviours.ordered import in_order_of_appearance
+from behaviours.ordered import distinct_rows, in_order_of_appearance
+from behaviours.schema import Schema
 from behaviours.space import Space
 from torchvsa import CleanUp, ShapeError
 
@@ -24,11 +26,7 @@ class ResultMemory(nn.Module):
 
     def __init__(self, space: Space, levels: Int64[Tensor, "k m"]) -> None:
         super().__init__()
-        if levels.dim() != 2 or levels.shape[1] != len(space.schema.actuators):
-            raise ShapeError(
-                f"results must be rows of one level per actuator, [k, {len(space.schema.actuators)}]; "
-                f"got shape {tuple(levels.shape)}"
-            )
+        check_levels(space.schema, levels)
         # In a tuple: the behaviour owns the space, whose codebooks must not stand twice in its state.
         self._space = (space,)
         self.register_buffer("levels", levels)
@@ -42,11 +40,53 @@ class ResultMemory(nn.Module):
         (space,) = self._space
         self.items = space.results(self.levels)
         self.commands = decode(space, self.levels, self.items)
+        self._derived_from = tuple(tensor.clone() for tensor in self._sources())
+
+    def current_items(self) -> Shaped[Tensor, "k d"]:
+        """`items`; on a CPU, derived anew (and `commands` with them) if levels or codebooks were changed in place."""
+        if not torch.compiler.is_compiling() and self.levels.device.type == "cpu":
+            sources = zip(self._derived_from, self._sources(), strict=True)
+            if not all(kept.dtype == now.dtype and torch.equal(kept, now) for kept, now in sources):
+                self.derive()
+        return self.items
+
+    def _sources(self) -> tuple[Tensor, ...]:
+        (space,) = self._space
+        return self.levels, space.results.codes, space.results.roles, space.results.table
+
+    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "ResultMemory":
+        # Commands stay in float64, and go with the levels to another device.
+        commands = self.commands
+        super()._apply(fn, recurse)
+        self.commands = commands.to(self.levels.device)
+        return self
 
 
 def _derive_again(module: nn.Module, _: Any) -> None:
     assert isinstance(module, ResultMemory)
     module.derive()
+
+
+def check_levels(schema: Schema, levels: Int64[Tensor, "k m"]) -> None:
+    """Raise `ValueError` unless `levels` are distinct rows of levels of the actuators, at least one."""
+    actuators = schema.actuators
+    if levels.dim() != 2 or levels.shape[1] != len(actuators) or len(levels) == 0:
+        raise ShapeError(
+            f"results must be rows of one level per actuator, [k, {len(actuators)}] with k at least 1; "
+            f"got shape {tuple(levels.shape)}"
+        )
+    if levels.dtype != torch.int64:
+        raise ValueError(f"results must be levels in torch.int64; got {levels.dtype}")
+    ends = torch.tensor([actuator.levels for actuator in actuators], device=levels.device)
+    wrong = (levels < 0) | (levels >= ends)
+    if wrong.any():
+        row, column = wrong.nonzero()[0].tolist()
+        raise ValueError(
+            f"results holds level {levels[row, column]} in row {row} for actuator {actuators[column].name!r}, "
+            f"which has the levels 0 to {actuators[column].levels - 1}"
+        )
+    if len(distinct_rows(levels)[0]) < len(levels):
+        raise ValueError("results must differ from each other; two of the rows are the same")
 
 
 def decode(space: Space, levels: Int64[Tensor, "k m"], items: Shaped[Tensor, "k d"]) -> Tensor:

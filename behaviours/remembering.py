@@ -1,9 +1,9 @@
 """Conditions with a memory: the present one bundled with permuted past ones, so that equal readings can differ."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 import torch
@@ -57,12 +57,22 @@ class RememberingSpace(Space):
 
     def config(self) -> dict[str, Any]:
         """What `RememberingSpace.from_config` needs, beside the tensors, to make an equal space."""
-        return {"space": self.present.config(), "lags": list(self.lags)}
+        return {"kind": "remembering", "space": self.present.config(), "lags": list(self.lags)}
+
+    def codebooks(self) -> dict[str, Tensor]:
+        """See `Space.codebooks`: those of the present."""
+        return self.present.codebooks()
 
     @classmethod
-    def from_config(cls, config: dict[str, Any]) -> "RememberingSpace":
-        """The inverse of `config`."""
-        return cls(Space.from_config(config["space"]), config["lags"])
+    def layout(cls, config: dict[str, Any]) -> dict[str, tuple[torch.dtype, tuple]]:
+        """See `Space.layout`."""
+        return Space.layout(config["space"])
+
+    @classmethod
+    def from_config(cls, config: dict[str, Any], codebooks: Mapping[str, Tensor] | None = None) -> Self:
+        """See `Space.from_config`."""
+        lags = check_lags(config["lags"])
+        return cls(Space.from_config(config["space"], codebooks), lags)
 
 
 class Recent:

@@ -1,7 +1,9 @@
 """The codebooks that behaviours share, so that their programs can be added."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from operator import index
+from typing import Any, Self, SupportsIndex
 
 import torch
 from jaxtyping import Int64, Shaped
@@ -9,6 +11,7 @@ from torch import Tensor, nn
 
 import torchvsa
 from behaviours.schema import Schema
+from behaviours.storage import check_layout, naming
 from torchvsa import PROTECTIONS, VSA, Protection, Record, Thresholds
 
 
@@ -27,6 +30,18 @@ class Encoder:
     span: int | None = None
     subset: int | None = None
     results: str = "lookup"
+
+    def __post_init__(self) -> None:
+        for name in ("bins", "span", "subset"):
+            value = getattr(self, name)
+            if name != "bins" and value is None:
+                continue
+            if isinstance(value, bool) or not isinstance(value, SupportsIndex) or index(value) < 1:
+                raise ValueError(f"{name} is a whole number of at least 1; got {value!r}")
+            object.__setattr__(self, name, index(value))
+        for name in ("values", "combine", "results"):
+            if not isinstance(getattr(self, name), str):
+                raise ValueError(f"{name} is the name of a part; got {getattr(self, name)!r}")
 
 
 class Space(nn.Module):
@@ -48,6 +63,9 @@ class Space(nn.Module):
         seed: int = 0,
     ) -> None:
         super().__init__()
+        if isinstance(seed, bool) or not isinstance(seed, SupportsIndex) or not 0 <= index(seed) < 2**63:
+            raise ValueError(f"seed is a whole number in [0, 2^63); got {seed!r}")
+        seed = index(seed)
         self.schema, self.vsa, self.seed = schema, vsa, seed
         self.encoder = encoder or Encoder()
         generator = torch.Generator().manual_seed(seed)
@@ -59,17 +77,15 @@ class Space(nn.Module):
             self.conditions = Record(vsa, len(schema.sensors), bins, generator=generator, **options)
         most = max(actuator.levels for actuator in schema.actuators)
         self.results = Record(vsa, len(schema.actuators), most, results, generator=generator)
-        if not isinstance(protection, Protection):
-            given: dict[str, Any] = {"name": protection} if isinstance(protection, str) else dict(protection)
-            name = given.pop("name")
-            if name not in PROTECTIONS:
-                raise ValueError(f"there is no protection {name!r}; choose one of {', '.join(PROTECTIONS)}")
-            if name == "self_shift":
-                given["h"] = vsa.random(generator=generator)
-            protection = PROTECTIONS[name](vsa, **given)
-        elif protection.vsa != vsa:
-            raise ValueError(f"the protection works on {protection.vsa}, this space on {vsa}")
-        self.protect = protection
+        if isinstance(protection, Protection):
+            if protection.vsa != vsa:
+                raise ValueError(f"the protection works on {protection.vsa}, this space on {vsa}")
+            self.protect = protection
+        else:
+            kind, options = _protection(protection)
+            if "h" in kind.layout(vsa):
+                options["h"] = vsa.random(generator=generator)
+            self.protect = kind(vsa, **options)
 
     def bins(self, readings: Any) -> Int64[Tensor, "batch n"]:
         """The bin of each reading, -1 where it was not observed; raises for invalid readings."""
@@ -82,6 +98,7 @@ class Space(nn.Module):
     def config(self) -> dict[str, Any]:
         """What `Space.from_config` needs, beside the tensors, to make an equal space."""
         return {
+            "kind": "space",
             "schema": self.schema.to_dict(),
             "vsa": self.vsa.config(),
             "encoder": asdict(self.encoder),
@@ -89,13 +106,72 @@ class Space(nn.Module):
             "seed": self.seed,
         }
 
-    @classmethod
-    def from_config(cls, config: dict[str, Any]) -> "Space":
-        """The inverse of `config`; parts are looked up by name, nothing in it is run."""
-        return cls(
-            Schema.from_dict(config["schema"]),
-            torchvsa.architecture(**config["vsa"]),
-            Encoder(**config["encoder"]),
-            config["protection"],
-            config["seed"],
+    def codebooks(self) -> dict[str, Tensor]:
+        """The tensors that, with `config`, make an equal space."""
+        return self.state_dict()
+
+    def same_as(self, other: "Space") -> bool:
+        """Whether both encode everything alike: equal configurations and equal codebooks, wherever they are."""
+        if self is other:
+            return True
+        mine, theirs = self.codebooks(), other.codebooks()
+        return (
+            self.config() == other.config()
+            and mine.keys() == theirs.keys()
+            and all(torch.equal(tensor.cpu(), theirs[name].cpu()) for name, tensor in mine.items())
         )
+
+    @classmethod
+    def layout(cls, config: dict[str, Any]) -> dict[str, tuple[torch.dtype, tuple]]:
+        """The types and shapes of the codebooks of a space with this configuration, found without making it."""
+        schema, vsa, encoder = _parts(config)
+        sensors, actuators = len(schema.sensors), len(schema.actuators)
+        if encoder.combine == "thresholds":
+            conditions = Thresholds.layout(vsa, sensors, encoder.subset)
+        else:
+            conditions = Record.layout(vsa, sensors, encoder.bins, encoder.combine)
+        results = Record.layout(vsa, actuators, max(actuator.levels for actuator in schema.actuators))
+        parts = {
+            "conditions": conditions,
+            "results": results,
+            "protect": _protection(config["protection"])[0].layout(vsa),
+        }
+        return {f"{part}.{name}": wanted for part, layout in parts.items() for name, wanted in layout.items()}
+
+    @classmethod
+    def from_config(cls, config: dict[str, Any], codebooks: Mapping[str, Tensor] | None = None) -> Self:
+        """The inverse of `config`; parts are looked up by name, nothing in it is run.
+
+        Without `codebooks` they are drawn from the seed. Raises `ValueError` naming what does not fit; codebooks are
+        compared with the configuration before anything is made.
+        """
+        if codebooks is not None:
+            check_layout(codebooks, cls.layout(config))
+        schema, vsa, encoder = _parts(config)
+        with naming("space"):
+            space = cls(schema, vsa, encoder, config["protection"], config["seed"])
+        if codebooks is not None:
+            space.load_state_dict(dict(codebooks))
+            for name in ("conditions", "results", "protect"):
+                with naming(name):
+                    getattr(space, name).check()
+        return space
+
+
+def _parts(config: dict[str, Any]) -> tuple[Schema, VSA, Encoder]:
+    """What of a configuration takes no memory."""
+    with naming("schema"):
+        schema = Schema.from_dict(config["schema"])
+    with naming("vsa"):
+        vsa = torchvsa.architecture(**config["vsa"])
+    with naming("encoder"):
+        return schema, vsa, Encoder(**config["encoder"])
+
+
+def _protection(given: str | dict[str, Any]) -> tuple[type[Protection], dict[str, Any]]:
+    """The class of a protection, by its name, and its options."""
+    options: dict[str, Any] = {"name": given} if isinstance(given, str) else dict(given)
+    name = options.pop("name", None)
+    if name not in PROTECTIONS:
+        raise ValueError(f"there is no protection {name!r}; choose one of {', '.join(PROTECTIONS)}")
+    return PROTECTIONS[name], options

@@ -1,62 +1,111 @@
-"""Files of tensors: safetensors, written whole or not at all, and never a pickle."""
+"""Files of tensors: safetensors, written whole or not at all, and never a pickle.
 
+A file holds one metadata entry, `torchvsa`: JSON with the kind of the file, the version of its format, a description,
+and a checksum of description and tensors. The same content gives the same bytes. Files of format 2 (torchvsa 0.2.0)
+are read by all later versions.
+"""
+
+import hashlib
 import json
-import os
-import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from safetensors import SafetensorError, safe_open
-from safetensors.torch import save
+import safetensors.torch
+import torch
+from safetensors import SafetensorError
 from torch import Tensor
 
+from behaviours._atomic import write_atomically
 
-def write_atomically(path: str | Path, content: bytes) -> Path:
-    """Write `content` beside `path` and move it there: readers see the old file or the new one, never half."""
-    path = Path(path)
-    try:
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    except OSError as error:
-        raise OSError(
-            f"cannot write {path}: {error.strerror} (does the folder exist, and may you write there?)"
-        ) from error
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
-    except BaseException as error:
-        Path(temporary).unlink(missing_ok=True)
-        if isinstance(error, OSError):
-            raise OSError(f"cannot write {path}: {error.strerror}") from error
-        raise
-    return path
+__all__ = ["FORMAT", "Layout", "check_layout", "load_tensors", "naming", "save_tensors", "write_atomically"]
+
+FORMAT = 2
+"""The version of the files that are written."""
+
+Layout = Mapping[str, tuple[torch.dtype, tuple[int, ...]]]
+"""Tensors by name: their types and shapes."""
 
 
-def save_tensors(path: str | Path, kind: str, tensors: dict[str, Tensor], about: dict[str, Any]) -> Path:
+def save_tensors(path: str | Path, kind: str, tensors: Mapping[str, Tensor], about: Mapping[str, Any]) -> Path:
     """Write tensors and a JSON-able description of the given kind ("bank", "demonstrations") to one file."""
     flat = {name: tensor.detach().cpu().contiguous().clone() for name, tensor in tensors.items()}
-    return write_atomically(path, save(flat, {"kind": f"torchvsa.{kind}", "format": "1", "about": json.dumps(about)}))
+    head = {"kind": kind, "format": FORMAT, "about": about}
+    # One metadata entry: safetensors writes several of them in any order.
+    text = json.dumps(head | {"checksum": checksum(head, flat)})
+    return write_atomically(path, safetensors.torch.save(flat, {"torchvsa": text}))
 
 
 def load_tensors(path: str | Path, kind: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Read what `save_tensors` wrote; raises `ValueError` if the file is something else."""
+    """Read what `save_tensors` wrote, into memory of its own: whatever becomes of the file, the tensors stay.
+
+    Raises `ValueError` if the file is something else, or was changed since it was written.
+    """
     path = Path(path)
     if not path.is_file():
         raise FileNotFoundError(f"there is no file {path}")
+    content = path.read_bytes()
     try:
-        with safe_open(path, framework="pt") as file:
-            about = file.metadata() or {}
-            if about.get("kind") != f"torchvsa.{kind}" or about.get("format") != "1":
-                raise ValueError(f"{path} holds {about.get('kind', 'other tensors')}, not torchvsa.{kind} in format 1")
-            return {name: file.get_tensor(name) for name in file.keys()}, json.loads(about["about"])  # noqa: SIM118 (not a mapping)
-    except (SafetensorError, json.JSONDecodeError, KeyError) as error:
+        tensors = safetensors.torch.load(content)
+        # Where the tensors could be read, the header before them is sound JSON.
+        head = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")]).get("__metadata__", {})
+    except (SafetensorError, ValueError, LookupError, RecursionError, AssertionError, AttributeError) as error:
         raise ValueError(f"{path} is not a readable torchvsa {kind} file: {error}") from error
+    if head.get("format") == "1":
+        raise ValueError(f"{path} was written by torchvsa 0.1, whose files later versions do not read; make it anew")
+    if "torchvsa" not in head:
+        raise ValueError(f"{path} holds other tensors, not a torchvsa {kind}")
+    with naming(str(path)):
+        with naming("description"):
+            described = json.loads(head["torchvsa"])
+            _check_head(described, kind)
+        if described.pop("checksum", None) != checksum(described, tensors):
+            raise ValueError("the checksum does not fit: the file was changed or damaged since it was written")
+    return tensors, described["about"]
 
 
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+def _check_head(head: Any, kind: str) -> None:
+    if not isinstance(head, dict) or not isinstance(head.get("about"), dict):
+        raise ValueError("it must be an object with 'kind', 'format', 'about' and 'checksum'")
+    if head.get("kind") != kind:
+        raise ValueError(f"the file holds {head.get('kind')!r}, not {kind!r}")
+    version = head.get("format")
+    if version != FORMAT or isinstance(version, bool):
+        raise ValueError(f"the file has format {version!r}; this version reads format {FORMAT}")
+
+
+def checksum(head: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> str:
+    """SHA-256 of a description and of all names, types, shapes and bytes of the tensors."""
+    sums = hashlib.sha256(json.dumps(head, sort_keys=True).encode())
+    for name in sorted(tensors):
+        tensor = tensors[name]
+        sums.update(json.dumps([name, str(tensor.dtype), list(tensor.shape)]).encode())
+        if tensor.numel():
+            sums.update(tensor.reshape(-1).view(torch.uint8).numpy().data)
+    return sums.hexdigest()
+
+
+def check_layout(tensors: Mapping[str, Tensor], expected: Layout) -> None:
+    """Raise `ValueError` naming a tensor that is missing, unknown, or of another type or shape than expected."""
+    for name in sorted(expected.keys() - tensors.keys()):
+        raise ValueError(f"tensor {name!r} is missing")
+    for name in sorted(tensors.keys() - expected.keys()):
+        raise ValueError(f"tensor {name!r} does not belong here")
+    for name, (dtype, shape) in expected.items():
+        found = tensors[name]
+        if found.dtype != dtype or tuple(found.shape) != shape:
+            raise ValueError(
+                f"tensor {name!r} is {found.dtype} {list(found.shape)}; the description asks for {dtype} {list(shape)}"
+            )
+
+
+@contextmanager
+def naming(what: str) -> Iterator[None]:
+    """Turn whatever wrong content of a file raises into a `ValueError` that begins with `what` it is found in."""
+    try:
+        yield
+    except KeyError as error:
+        raise ValueError(f"{what}: {error.args[0]!r} is missing") from error
+    except (ArithmeticError, AttributeError, LookupError, RuntimeError, TypeError, ValueError) as error:
+        raise ValueError(f"{what}: {str(error) or type(error).__name__}") from error

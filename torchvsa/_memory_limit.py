@@ -2,12 +2,18 @@
 
 import os
 
+_SMALL = 2**26
+"""Bytes below which the system is not asked, which takes as long as drawing many small hypervectors."""
+
 
 def require_memory(needed: int, what: str, advice: str) -> None:
     """Raise `ValueError` if `needed` bytes are more than the machine has available now.
 
-    `what` says what would take them, `advice` what to do instead. Only a CPU's memory is looked at.
+    `what` says what would take them, `advice` what to do instead. Only a CPU's memory is looked at, and not at all for
+    less than 64 MiB.
     """
+    if needed < _SMALL:
+        return
     available = _available()
     if needed > available:
         raise ValueError(f"{what} needs {_size(needed)} of memory, of which {_size(available)} are available; {advice}")

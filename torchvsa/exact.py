@@ -1,14 +1,18 @@
 """Products and norms of hypervectors, exact wherever the type is an integer.
 
-The type alone says which path runs: boolean vectors count as -1 / +1, integer products are exact, complex
-ones are Hermitian and give their real part. No value is looked at, so nothing here stalls a GPU or breaks a
-graph.
+The type says which path runs: boolean vectors count as -1 / +1, integer products are exact, complex ones are Hermitian
+and give their real part. Floats are brought into a range where squares fit, wherever they are out of it; a CPU looks
+for that at the lengths, while in graphs and on other devices, where a look would break or stall something, all of them
+are. The results are the same.
 """
+
+from functools import reduce
 
 import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
+from torchvsa._checks import readable, type_bound
 from torchvsa.blocks import by_blocks
 from torchvsa.operators import integer_product, product
 
@@ -30,12 +34,17 @@ def real_parts(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
 
 _FEW = 16
 """Rows up to which it does not pay to square them in a type of their own."""
+_INT8_TERMS = 2**17 - 32
+"""Products of two int8 numbers, at most 2^14 each, whose sum fits int32; a multiple of a GPU's tiles."""
 
 
 def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
     """The inner product of each query with each item.
 
-    Integers: exact (int8 by int8 accumulates in int32, anything wider in float64, exact below 2^53).
+    Integers: int8 by int8 is exact, in int32, or in int64 from d = 131,041 on; anything wider is summed in float64,
+    exact as long as sums of absolute products stay below 2^53, and else rounded as float64 is.
+    Integers by floats: in the floats' type, but at least float32 for int8 and float64 for anything wider.
+    Floats: in the wider of both types, at least float32.
     Complex: the real part of the Hermitian product.
     """
     a, b = signed(queries), signed(items)
@@ -46,32 +55,118 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
     if int8 and (a.device.type == "cuda" or (a.device.type == "cpu" and a.shape[-1] > 1)):
         # Units for int8; those of a CPU answer nonsense where d = 1.
-        return integer_product(a.reshape(-1, a.shape[-1]), b).reshape(*a.shape[:-1], len(b))
-    if is_integer(a) or is_integer(b):
-        # A float accumulator beside integer codes stays in its own type: it is exact while it holds integers.
-        wide = torch.float64 if is_integer(a) and is_integer(b) else torch.promote_types(a.dtype, b.dtype)
-    else:
-        wide = torch.promote_types(a.dtype, b.dtype)
+        return _int8_dots(a.reshape(-1, a.shape[-1]), b).reshape(*a.shape[:-1], len(b))
+    wide = torch.promote_types(torch.promote_types(a.dtype, b.dtype), torch.float32)
+    if is_integer(a) and is_integer(b):
+        wide = torch.float64
+    elif any(is_integer(x) and x.dtype.itemsize > 2 for x in (a, b)):
+        wide = torch.float64  # float32 does not hold every int32
     return product(a.to(wide), b.to(wide))
 
 
+def _int8_dots(a: Shaped[Tensor, "rows d"], b: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "rows k"]:
+    if a.shape[1] <= _INT8_TERMS:
+        return integer_product(a, b)
+    parts = zip(a.split(_INT8_TERMS, 1), b.split(_INT8_TERMS, 1), strict=True)
+    # A last part of one element would meet the units of a CPU where they answer nonsense.
+    sums = (integer_product(x, y) if x.shape[1] > 1 else x.to(torch.int32) * y.T.to(torch.int32) for x, y in parts)
+    return reduce(Tensor.add_, sums, torch.zeros(len(a), len(b), dtype=torch.int64, device=a.device))
+
+
 def paired_dots(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
-    """The inner product of a with b, element by element of the (broadcast) batch; exact for integers."""
-    a, b = signed(a), signed(b)
+    """The inner product of a with b, element by element of the (broadcast) batch.
+
+    Integers: exact, in int64, where their types and d prove that it fits (int8 by anything up to int32, say).
+    Otherwise in float64: the exact sum if it is below 2^62, rounded once, and else summed in float64. Integers wider
+    than int16 by floats count as float64; half precision as float32.
+    """
+    a, b = widened(a), widened(b)
     if a.is_complex() or b.is_complex():
         return (a * b.conj()).real.sum(-1)
-    if is_integer(a) and is_integer(b):
-        # A product of two int8 fits int16, which moves a quarter of the bytes.
-        wide = torch.int16 if a.dtype == b.dtype == torch.int8 else torch.int64
-        return (a.to(wide) * b).sum(-1, dtype=torch.int64)
-    return (a * b).sum(-1)
+    if not (is_integer(a) and is_integer(b)):
+        a, b = (x.to(torch.float64) if is_integer(x) and x.dtype.itemsize > 2 else x for x in (a, b))
+        return (a * b).sum(-1)
+    # A product of two int8 fits int16, which moves a quarter of the bytes.
+    wide = torch.int16 if a.dtype == b.dtype == torch.int8 else torch.int64
+    whole = (a.to(wide) * b).sum(-1, dtype=torch.int64)
+    if type_bound(a.dtype) * type_bound(b.dtype) * max(a.shape[-1], b.shape[-1]) < 2**63:
+        return whole
+    # Sums of integers wrap around without harm if the result fits. This says where it does, without a look at values.
+    estimate = (a.to(torch.float64) * b).sum(-1)
+    return torch.where(estimate.abs() < 2.0**62, whole.to(torch.float64), estimate)
 
 
 def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
-    """Euclidean length in float64 (integers: the root of an exact sum), with a gradient of 0 at the zero vector."""
+    """Euclidean length in float64, with a gradient of 0 at the zero vector.
+
+    Integers: the root of `paired_dots`. Floats: correct at any scale; NaN where an element is NaN or infinite.
+    """
     if x.dtype == torch.int8 and x.dim() == 2 and not torch.compiler.is_exporting() and len(x) > _FEW:
         return root(by_blocks(_int8_squares, x, row_bytes=4 * x.shape[-1]))
-    return root(paired_dots(x, x))
+    _, lengths, unit = in_range(x)
+    return lengths if unit is None else lengths * unit[..., 0].to(torch.float64)
+
+
+def cosines(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
+    """The cosine of a with b, element by element of the (broadcast) batch, in float64 and independent of scale."""
+    (a, a_lengths, _), (b, b_lengths, _) = in_range(a), in_range(b)
+    return divide(paired_dots(a, b), a_lengths * b_lengths)
+
+
+def widened(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
+    """Bits as votes, half precision as float32; any other tensor as it is."""
+    return x.to(torch.float32) if x.dtype in (torch.float16, torch.bfloat16) else signed(x)
+
+
+_SHORTEST, _LONGEST = 2.0**-30, 2.0**50
+"""Lengths between which squares and products of two vectors neither overflow in float32 nor lose digits."""
+
+
+def ordinary(lengths: Shaped[Tensor, "*batch"]) -> bool:
+    """Whether all lengths are seen to be of ordinary size; False where values cannot be looked at."""
+    if not readable(lengths) or lengths.numel() == 0:
+        return lengths.numel() == 0
+    low, high = torch.aminmax(lengths.detach())
+    return float(low) > _SHORTEST and float(high) < _LONGEST
+
+
+def units(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch 1"]:
+    """A power of two for each vector, by which to divide it so that its largest element is from 1 to 2.
+
+    Dividing by a power of two rounds nothing, so that results keep their bits. 1 for a zero vector, NaN where an
+    element is NaN or infinite.
+    """
+    largest = x.detach().abs().amax(-1, keepdim=True)
+    if torch.compiler.is_exporting():
+        power = torch.exp2(torch.log2(largest).floor())  # interchange formats lack the exact way
+    else:
+        power = largest / (2 * torch.frexp(largest).mantissa)
+    return torch.where(largest == 0, torch.ones_like(power), power)
+
+
+def _lengths(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
+    if x.dim() != 2:
+        return root(paired_dots(x, x))
+    # In blocks, the squares stay in the cache.
+    return by_blocks(lambda rows: root(paired_dots(rows, rows)), x, row_bytes=2 * x.shape[1] * x.dtype.itemsize)
+
+
+def in_range(
+    x: Shaped[Tensor, "*batch d"],
+) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch"], Shaped[Tensor, "*batch 1"] | None]:
+    """Vectors whose squares neither overflow nor vanish, their lengths in float64, and the `units` that divided them.
+
+    Ordinary vectors and integers are as they were (`widened`), and their units None.
+    """
+    x = widened(x)
+    if is_integer(x):
+        return x, root(paired_dots(x, x)), None
+    if readable(x) and ordinary(lengths := _lengths(x)):
+        return x, lengths, None
+    unit = units(x)
+    # A division of complex numbers would take products of them, which vanish.
+    x = torch.view_as_complex(torch.view_as_real(x.resolve_conj()) / unit[..., None]) if x.is_complex() else x / unit
+    return x, root(paired_dots(x, x)), unit
 
 
 def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
@@ -84,14 +179,14 @@ def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
 def root(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
     """The square root in float64, with a gradient of 0 at 0."""
     squares = squares.to(torch.float64)
-    return torch.where(squares > 0, torch.where(squares > 0, squares, 1.0).sqrt(), 0.0)
+    return torch.where(squares == 0, 0.0, torch.where(squares == 0, 1.0, squares).sqrt())
 
 
 def divide(values: Shaped[Tensor, "*s"], lengths: Shaped[Tensor, "*t"]) -> Shaped[Tensor, "*s"]:
     """`values / lengths`, and 0 where the length is 0: a zero vector is similar to nothing."""
-    return torch.where(lengths > 0, values / torch.where(lengths > 0, lengths, 1.0), 0.0)
+    return torch.where(lengths == 0, 0.0, values / torch.where(lengths == 0, 1.0, lengths))
 
 
 def scaled(products: Shaped[Tensor, "*batch"], lengths: Shaped[Tensor, "*#batch"]) -> Shaped[Tensor, "*batch"]:
     """`divide` for products with vectors of these lengths: those with a zero vector are 0 already, so one pass does."""
-    return products / torch.where(lengths > 0, lengths, 1.0)
+    return products / torch.where(lengths == 0, 1.0, lengths)

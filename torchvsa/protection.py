@@ -10,8 +10,11 @@ import torch
 from jaxtyping import Int, Shaped
 from torch import Tensor, nn
 
+from torchvsa._checks import whole_number
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.blocks import by_blocks
+from torchvsa.errors import ShapeError
 from torchvsa.exact import dots, is_integer, signed
 
 
@@ -36,6 +39,14 @@ class Protection(nn.Module):
         """The name in `PROTECTIONS` and the options from which it is made again."""
         return {"name": self.name}
 
+    @staticmethod
+    def layout(vsa: VSA) -> dict[str, tuple[torch.dtype, tuple]]:
+        """The types and shapes of its tensors, found without making it."""
+        return {}
+
+    def check(self) -> None:
+        """Raise `ValueError` naming the tensor if one does not hold codes of the architecture."""
+
 
 class Unprotected(Protection):
     """No protection: similar conditions stay similar, so that a program can generalise between them."""
@@ -58,7 +69,7 @@ class FixedShift(Protection):
 
     def __init__(self, vsa: VSA, shift: int = 1) -> None:
         super().__init__(vsa)
-        self.shift = shift
+        self.shift = whole_number(shift, "the shift of a fixed shift is a whole number")
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Shift to the right."""
@@ -109,15 +120,31 @@ class SelfShift(Protection):
         if width not in ("mean", "sum"):
             raise ValueError(f"the width of a self-derived shift is 'mean' or 'sum'; got {width!r}")
         self.width_rule = width
+        count = _places(vsa.dim)
+        # The columns are computed in int64, in three steps.
+        require_memory(8 * (3 * count + 2) * vsa.dim, f"a self-derived shift of d = {vsa.dim}", "take fewer dimensions")
+        if h is not None and h.shape != (vsa.dim,):
+            raise ShapeError(f"h must be one hypervector of d = {vsa.dim} elements; got shape {tuple(h.shape)}")
+        if h is not None and h.dtype != vsa.dtype:
+            raise ValueError(f"h must be a hypervector of {vsa}; got {h.dtype}")
         if h is None:
             h = vsa.random(generator=torch.Generator().manual_seed(seed))
         self.register_buffer("h", h)
         # Indices in base 128, so that their sums are exact products of int8 on any device.
-        places = 128 ** torch.arange(_places(vsa.dim))
+        places = 128 ** torch.arange(count)
         digits = torch.arange(vsa.dim) // places[:, None] % 128
         columns = torch.cat([torch.ones(1, vsa.dim, dtype=torch.int64), digits])
         self.register_buffer("columns", columns.to(torch.int8), persistent=False)
         self.register_buffer("places", places, persistent=False)
+
+    @staticmethod
+    def layout(vsa: VSA) -> dict[str, tuple[torch.dtype, tuple]]:
+        """See `Protection.layout`."""
+        return {"h": (vsa.dtype, (vsa.dim,))}
+
+    def check(self) -> None:
+        """See `Protection.check`."""
+        self.vsa.check_codes(self.h, "h")
 
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""

@@ -2,8 +2,10 @@
 
 import copy
 import math
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import plain
 import pytest
 import torch
@@ -28,7 +30,7 @@ def same(a: Recall, b: Recall) -> bool:
 def test_digits_are_the_numbers(numbers: list[int]) -> None:
     # As many rows of numbers of one element, and one row of many.
     for rows in (torch.tensor(numbers)[:, None], torch.tensor([numbers])):
-        digits, weights = _digits(rows)
+        digits, weights = _digits(rows, 8)
         assert digits.dtype == torch.int8
         assert torch.equal(_joined(digits.T, weights).T, rows.to(torch.float64))
 
@@ -69,6 +71,51 @@ def test_a_changed_program_is_folded_anew() -> None:
     twin.program.zero_()
     assert (twin(READINGS).similarity == 0).all()
     assert same(behaviour(READINGS), other(READINGS))
+
+
+WRITES: dict[str, Callable[[torch.Tensor], object]] = {
+    "data": lambda tensor: tensor.data.mul_(-1),
+    "numpy": lambda tensor: np.negative(tensor.numpy(), out=tensor.numpy()),
+    "dlpack": lambda tensor: torch.from_dlpack(tensor).mul_(-1),
+}
+
+
+@pytest.mark.parametrize("part", ["program", "known", "space.results.codes", "space.results.roles", "memory.levels"])
+@pytest.mark.parametrize("write", WRITES)
+def test_answers_follow_what_is_written_by_whatever_way(write: str, part: str) -> None:
+    behaviour = OneShot().fit(space(200), random_pairs(4))
+    before = behaviour(READINGS)
+    *owner, name = part.split(".")
+    tensor = getattr(behaviour.get_submodule(".".join(owner)), name)
+    WRITES[write](tensor)
+    if part == "memory.levels":
+        tensor.add_(2)  # levels 0 to 2 turned round
+    behaviour.space.results.derive()  # what a codebook's owner does after writing into it
+    fresh = Behaviour(behaviour.space, behaviour.program, behaviour.known, behaviour.results, behaviour.report)
+    assert same(behaviour(READINGS), fresh(READINGS))
+    assert not same(behaviour(READINGS), before)
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-30, 1e25, 1e300])
+@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
+def test_cosines_do_not_depend_on_the_size_of_a_program(dtype: torch.dtype, scale: float) -> None:
+    if dtype == torch.float32 and not 1e-36 < scale < 1e36:
+        pytest.skip("float32 holds no such numbers")
+    behaviour = OneShot().fit(space(200), random_pairs(20))
+    program, known = (vector.to(dtype) * scale for vector in (behaviour.program, behaviour.known))
+    large = Behaviour(behaviour.space, program, known, behaviour.results, behaviour.report)
+    for expected, got in zip(behaviour(READINGS)[:4], large(READINGS)[:4], strict=True):
+        assert_close(torch.as_tensor(got), torch.as_tensor(expected), rtol=1e-5, atol=1e-6, equal_nan=True)
+
+
+@pytest.mark.parametrize("dtype", [torch.float16, torch.bfloat16])
+def test_behaviours_of_half_precision_answer_alike(dtype: torch.dtype) -> None:
+    behaviour = OneShot().fit(space(4000, dtype="float32", protection="none"), random_pairs(20))
+    before = behaviour(READINGS)
+    after = behaviour.to(dtype)(READINGS)
+    assert same_bits(after.commands, before.commands)
+    for expected, got in zip(before[1:4], after[1:4], strict=True):
+        assert_close(torch.as_tensor(got), torch.as_tensor(expected), rtol=1e-2, atol=1e-3)
 
 
 def test_programs_made_without_versions_are_asked_as_well() -> None:

@@ -70,5 +70,5 @@ def test_parts_that_do_not_exist() -> None:
         Space(SCHEMA, vsa, Encoder(values="rainbow"))
     with pytest.raises(ValueError, match="no combination 'knot'"):
         Space(SCHEMA, vsa, Encoder(combine="knot"))
-    with pytest.raises(ValueError, match="at least one sensor and one level; got 3 and 0"):
+    with pytest.raises(ValueError, match="bins is a whole number of at least 1; got 0"):
         Space(SCHEMA, vsa, Encoder(bins=0))

@@ -1,6 +1,6 @@
 """Files hold every bit, are written whole or not at all, and run nothing when they are read."""
 
-import json
+import copy
 import math
 import os
 import pickle
@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 import torch
 from robots import random_pairs, same_bits, space
-from safetensors import safe_open
 from safetensors.torch import load, save_file
 
 from behaviours import BehaviourBank, Demonstrations, ErrorDriven, OneShot
-from behaviours import storage as module
+from behaviours.remembering import RememberingSpace
+from behaviours.storage import load_tensors, save_tensors
 from torchvsa import ARCHITECTURES
 
 
@@ -24,8 +24,8 @@ def real(tensor: torch.Tensor) -> torch.Tensor:
     return torch.view_as_real(tensor) if tensor.is_complex() else tensor
 
 
-def bank(vsa: str = "MAP-C", protection: Any = "self_shift", **encoder: Any) -> BehaviourBank:
-    made = BehaviourBank(space(128, vsa, protection=protection, seed=3, **encoder))
+def bank(vsa: str = "MAP-C", protection: Any = "self_shift", dtype: str | None = None, **encoder: Any) -> BehaviourBank:
+    made = BehaviourBank(space(128, vsa, dtype, protection, seed=3, **encoder))
     made.learn("seek light", random_pairs(9), OneShot("similarity", clip_each_step=True))
     made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(passes=2))
     return made
@@ -59,9 +59,11 @@ def test_a_bank_comes_back_bit_for_bit(tmp_path: Path, vsa: str, protection: Any
 
 def test_codebooks_come_from_the_file_and_not_from_the_seed(tmp_path: Path) -> None:
     made = bank()
-    made.space.conditions.table.neg_()
-    loaded = BehaviourBank.load(made.save(tmp_path / "bank")).space.conditions.table
-    assert same_bits(loaded, made.space.conditions.table)
+    made.space.conditions.roles.neg_()
+    made.space.conditions.derive()
+    loaded = BehaviourBank.load(made.save(tmp_path / "bank")).space.conditions
+    assert same_bits(loaded.roles, made.space.conditions.roles)
+    assert same_bits(loaded.table, made.space.conditions.table)
 
 
 def test_an_empty_bank_comes_back(tmp_path: Path) -> None:
@@ -108,7 +110,7 @@ def test_a_write_that_fails_leaves_the_old_file(
     def fail(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(module.os, step, fail)
+    monkeypatch.setattr(os, step, fail)
     with pytest.raises(OSError, match=r"kept.*No space left on device"):
         save(path)
     assert path.read_bytes() == b"what was there before"
@@ -147,22 +149,25 @@ def test_files_that_are_something_else(load_file: Callable[[Path], object], tmp_
         with pytest.raises(ValueError, match=f"{path} is not a readable torchvsa"):
             load_file(path)
     save_file({"x": torch.ones(3)}, tmp_path / "foreign")
-    with pytest.raises(ValueError, match="foreign holds other tensors, not torchvsa"):
+    with pytest.raises(ValueError, match="foreign holds other tensors, not a torchvsa"):
         load_file(tmp_path / "foreign")
     SAVERS[1 - LOADERS.index(load_file)](tmp_path / "other")
-    with pytest.raises(ValueError, match=r"other holds torchvsa\.\w+, not torchvsa"):
+    with pytest.raises(ValueError, match=r"other: description: the file holds '\w+', not '\w+'"):
         load_file(tmp_path / "other")
 
 
-def rewritten(path: Path, change: Callable[[dict[str, Any], dict[str, torch.Tensor]], Any]) -> Path:
-    """The file with another description or other tensors."""
-    with safe_open(path, framework="pt") as file:
-        about = json.loads(file.metadata()["about"])
-        tensors = {name: file.get_tensor(name) for name in file.keys()}  # noqa: SIM118 (not a mapping)
-        metadata = file.metadata()
+@pytest.mark.parametrize(("version", "message"), [("1", "written by torchvsa 0.1"), ("9", "holds other tensors")])
+def test_files_of_other_versions(version: str, message: str, tmp_path: Path) -> None:
+    save_file({"x": torch.ones(3)}, tmp_path / "old", {"kind": "torchvsa.bank", "format": version, "about": "{}"})
+    with pytest.raises(ValueError, match=f"old.*{message}"):
+        BehaviourBank.load(tmp_path / "old")
+
+
+def rewritten(path: Path, kind: str, change: Callable[[dict[str, Any], dict[str, torch.Tensor]], Any]) -> Path:
+    """The file with another description or other tensors, and a checksum that fits."""
+    tensors, about = load_tensors(path, kind)
     change(about, tensors)
-    save_file(tensors, path, metadata | {"about": json.dumps(about)})
-    return path
+    return save_tensors(path, kind, tensors, about)
 
 
 CHANGES: dict[str, Callable[[dict[str, Any], dict[str, torch.Tensor]], Any]] = {
@@ -175,24 +180,182 @@ CHANGES: dict[str, Callable[[dict[str, Any], dict[str, torch.Tensor]], Any]] = {
     "no space": lambda about, _: about.pop("space"),
     "no schema": lambda about, _: about["space"].pop("schema"),
     "space of another kind": lambda about, _: about.update(space=[1]),
+    "space of an unknown kind": lambda about, _: about["space"].update(kind="torch.nn.Linear"),
+    "bins that are no number": lambda about, _: about["space"]["encoder"].update(bins="8"),
+    "more bins than codes": lambda about, _: about["space"]["encoder"].update(bins=10**9),
+    "more levels than codes": lambda about, _: about["space"]["schema"]["actuators"][0].update(levels=10**9),
+    "more dimensions than codes": lambda about, _: about["space"]["vsa"].update(dim=10**12),
+    "a range beyond all numbers": lambda about, _: about["space"]["schema"]["sensors"][0].update(high=10**400),
     "behaviours of another kind": lambda about, _: about.update(behaviours=["avoid"]),
-    "no program": lambda _, tensors: tensors.pop("behaviours.avoid.program"),
-    "program of another size": lambda _, tensors: tensors.update({"behaviours.avoid.program": torch.ones(5)}),
+    "a name twice": lambda about, _: about["behaviours"][1].update(name="seek light"),
+    "a name that is no text": lambda about, _: about["behaviours"][1].update(name=1),
+    "a behaviour left out": lambda about, _: about["behaviours"].pop(),
+    "no program": lambda _, tensors: tensors.pop("behaviours.1.program"),
+    "an unknown tensor": lambda _, tensors: tensors.update({"behaviours.2.program": torch.ones(128)}),
+    "program of another size": lambda _, tensors: tensors.update({"behaviours.1.program": torch.ones(5)}),
+    "program of another type": lambda _, tensors: tensors.update({"behaviours.1.program": torch.ones(128).half()}),
+    "program of NaN": lambda _, tensors: tensors.update({"behaviours.1.program": torch.full((128,), math.nan)}),
+    "known conditions of inf": lambda _, tensors: tensors.update({"behaviours.1.known": torch.full((128,), math.inf)}),
     "results of another robot": lambda _, tensors: tensors.update(
-        {"behaviours.avoid.results": torch.zeros(2, 7, dtype=torch.int64)}
+        {"behaviours.1.results": torch.zeros(2, 7, dtype=torch.int64)}
     ),
-    "no codebook": lambda _, tensors: tensors.pop("space.conditions.table"),
+    "results of another type": lambda _, tensors: tensors.update({"behaviours.1.results": torch.zeros(1, 2)}),
+    "a level below all": lambda _, tensors: tensors["behaviours.1.results"][0].fill_(-1),
+    "a level above all": lambda _, tensors: tensors["behaviours.1.results"][0].fill_(3),
+    "a result twice": lambda _, tensors: tensors["behaviours.1.results"][1].copy_(tensors["behaviours.1.results"][0]),
+    "no result": lambda _, tensors: tensors.update({"behaviours.1.results": torch.zeros(0, 2, dtype=torch.int64)}),
+    "no codebook": lambda _, tensors: tensors.pop("space.conditions.roles"),
+    "codebook of another type": lambda _, tensors: tensors.update(
+        {"space.conditions.codes": tensors["space.conditions.codes"].float() * 0.9}
+    ),
+    "codebook of other values": lambda _, tensors: tensors["space.conditions.codes"].mul_(127),
+    "a shift's vector of other values": lambda _, tensors: tensors["space.protect.h"].zero_(),
 }
 
 
 @pytest.mark.parametrize("change", CHANGES)
 def test_banks_that_describe_something_else(change: str, tmp_path: Path) -> None:
-    path = rewritten(bank().save(tmp_path / "bank"), CHANGES[change])
+    path = rewritten(bank().save(tmp_path / "bank"), "bank", CHANGES[change])
     with pytest.raises(ValueError, match=f"{path} does not describe a bank of this version"):
         BehaviourBank.load(path)
 
 
+CODES: dict[str, tuple[str, Callable[[torch.Tensor], object]]] = {
+    "MAP-B": ("conditions.roles", lambda codes: codes[0, 0].fill_(0)),
+    "HRR": ("conditions.codes", lambda codes: codes[0, 0].fill_(math.nan)),
+    "FHRR": ("results.codes", lambda codes: codes[0, 0].mul_(3)),
+}
+
+
+@pytest.mark.parametrize("vsa", CODES)
+def test_codebooks_that_hold_no_codes_of_their_architecture(vsa: str, tmp_path: Path) -> None:
+    name, change = CODES[vsa]
+    path = rewritten(bank(vsa).save(tmp_path / "bank"), "bank", lambda _, tensors: change(tensors[f"space.{name}"]))
+    part, codebook = name.split(".")
+    with pytest.raises(ValueError, match=f"{part}: {codebook} must hold codes of {vsa}"):
+        BehaviourBank.load(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("sensor", 3), ("sensor", -1), ("threshold", 20), ("threshold", -1)], ids=str
+)
+def test_thresholds_that_ask_about_what_is_not_there(name: str, value: int, tmp_path: Path) -> None:
+    made = bank(combine="thresholds", subset=2)
+    path = rewritten(
+        made.save(tmp_path / "bank"),
+        "bank",
+        lambda _, tensors: tensors[f"space.conditions.{name}"][0, 5].fill_(value),
+    )
+    with pytest.raises(ValueError, match=f"conditions: {name} must hold numbers in"):
+        BehaviourBank.load(path)
+
+
+def test_what_was_changed_without_its_checksum_is_refused(tmp_path: Path) -> None:
+    """One flipped bit of a program is enough."""
+    path = bank().save(tmp_path / "bank")
+    content = bytearray(path.read_bytes())
+    content[-1] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ValueError, match=f"{path}: the checksum does not fit"):
+        BehaviourBank.load(path)
+
+
+def test_what_cannot_be_loaded_is_not_saved(tmp_path: Path) -> None:
+    half = bank("MAP-C", dtype="float32").half()
+    with pytest.raises(ValueError, match=r"'space\.conditions\.\w+' is torch\.float16"):
+        half.save(tmp_path / "bank")
+    broken = bank("HRR")
+    broken["avoid"].program[3] = math.nan
+    with pytest.raises(ValueError, match="behaviour 'avoid': program holds values that are not finite"):
+        broken.save(tmp_path / "bank")
+    assert not list(tmp_path.iterdir())
+
+
 def test_demonstrations_without_their_commands(tmp_path: Path) -> None:
-    path = rewritten(random_pairs(3).save(tmp_path / "shown"), lambda _, tensors: tensors.pop("commands"))
+    path = rewritten(
+        random_pairs(3).save(tmp_path / "shown"), "demonstrations", lambda _, tensors: tensors.pop("commands")
+    )
     with pytest.raises(ValueError, match=f"{path}.*commands"):
         Demonstrations.load(path)
+
+
+@pytest.mark.parametrize("how", ["overwritten", "truncated"])
+def test_what_was_loaded_does_not_depend_on_the_file_any_more(how: str, tmp_path: Path) -> None:
+    path = bank().save(tmp_path / "bank")
+    shown = random_pairs(9).save(tmp_path / "shown")
+    loaded, rows = BehaviourBank.load(path), Demonstrations.load(shown)
+    state = {name: tensor.clone() for name, tensor in loaded.state_dict().items()}
+    sensors = rows.sensors.clone()
+    for file in (path, shown):
+        with file.open("r+b") as handle:  # the same file on the disk, as `cp` writes it
+            handle.truncate(0)
+            if how == "overwritten":
+                handle.write(b"\x01" * 10**6)
+    assert all(same_bits(tensor, state[name]) for name, tensor in loaded.state_dict().items())
+    assert same_bits(rows.sensors, sensors)
+
+
+def test_the_same_content_gives_the_same_bytes(tmp_path: Path) -> None:
+    made, shown = bank(), random_pairs(9)
+    contents = {made.save(tmp_path / str(number)).read_bytes() for number in range(8)}
+    contents.add(bank().save(tmp_path / "again").read_bytes())
+    contents.add(BehaviourBank.load(tmp_path / "0").save(tmp_path / "loaded").read_bytes())
+    assert len(contents) == 1
+    assert len({shown.save(tmp_path / str(number)).read_bytes() for number in range(8)}) == 1
+
+
+def test_a_bank_over_a_space_with_memory_comes_back(tmp_path: Path) -> None:
+    made = BehaviourBank(RememberingSpace(space(128), [1, 3]))
+    pairs = random_pairs(9)
+    made.learn("seek", Demonstrations(torch.cat([pairs.sensors] * 3, 1), pairs.commands))
+    again = BehaviourBank.load(made.save(tmp_path / "bank"))
+    assert isinstance(again.space, RememberingSpace)
+    assert again.space.same_as(made.space)
+    windows = torch.cat([random_pairs(9, seed=1).sensors] * 3, 1)
+    assert same_bits(again["seek"](windows).similarity, made["seek"](windows).similarity)
+
+
+NAMES = ["forward", "train", "to", "keys", "pop", "a.b", "a/b", " ", "\n", "\x00", "\ud800", "é\u202e", "x" * 1000]
+
+
+def test_any_text_names_a_behaviour(tmp_path: Path) -> None:
+    names = list(dict.fromkeys([*dir(torch.nn.ModuleDict()), *dir(BehaviourBank), *NAMES]))
+    made = BehaviourBank(space(32))
+    behaviour = OneShot().fit(made.space, random_pairs(3))
+    for name in names:
+        made.add(name, behaviour)
+    assert made.names == names
+    again = BehaviourBank.load(made.save(tmp_path / "bank"))
+    assert again.names == names
+    assert all(same_bits(again[name].program, behaviour.program) for name in again)
+
+
+@pytest.mark.parametrize("name", ["", 5, None, ("a",), True])
+def test_what_cannot_name_a_behaviour_is_refused_before_it_is_learned(name: Any) -> None:
+    class Unasked(OneShot):
+        def fit(self, *_: Any, **__: Any) -> Any:
+            raise AssertionError("it was learned first")
+
+    with pytest.raises(ValueError, match="name is a text that is not empty"):
+        BehaviourBank(space(32)).learn(name, random_pairs(3), Unasked())
+
+
+@pytest.mark.parametrize(
+    "duplicate", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))], ids=["copied", "pickled"]
+)
+def test_copies_of_a_behaviour_can_join_its_bank_again(duplicate: Callable[[Any], Any]) -> None:
+    made = bank()
+    twin = duplicate(made["avoid"])
+    twin.program.neg_()
+    made.add("flee", twin)
+    assert made["flee"].space is made.space
+    assert same_bits(made["flee"].program, -made["avoid"].program)
+    made.add("tuned", duplicate(made["avoid"].trainable()))
+    assert isinstance(made["tuned"].program, torch.nn.Parameter)
+    for other in (bank(protection="none"), BehaviourBank(space(128, seed=4))):
+        with pytest.raises(ValueError, match="learned over another space"):
+            other.add("avoid", made["avoid"])
+    changed = duplicate(made)
+    changed.space.conditions.codes[0].neg_()
+    with pytest.raises(ValueError, match="learned over another space"):
+        made.add("avoid", changed["avoid"])

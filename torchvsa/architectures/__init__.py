@@ -30,7 +30,11 @@ def architecture(name: str, dim: int, dtype: str | torch.dtype | None = None, **
         if not isinstance(found, torch.dtype):
             raise ValueError(f"there is no element type {dtype!r}; write e.g. 'float32' or 'int8'")
         dtype = found
-    return ARCHITECTURES[name](dim=dim, **({} if dtype is None else {"dtype": dtype}), **options)
+    make = ARCHITECTURES[name]
+    for option, fixed in (make.keywords if isinstance(make, partial) else {}).items():
+        if options.get(option, fixed) != fixed:
+            raise ValueError(f"{name} has the {option} {fixed!r}; got {option}={options[option]!r}")
+    return make(dim=dim, **({} if dtype is None else {"dtype": dtype}), **options)
 
 
 __all__ = ["ARCHITECTURES", "BSC", "FHRR", "HRR", "MAP", "VSA", "architecture"]

@@ -1,6 +1,8 @@
 """What every Vector Symbolic Architecture shares."""
 
+import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import reduce
 from typing import ClassVar
 
@@ -8,10 +10,17 @@ import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
+from torchvsa._checks import INTEGERS, whole_number
+from torchvsa._memory_limit import require_memory
+from torchvsa.architectures.sums import check_weights, integer_sum, stacked, weighted
 from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
-from torchvsa.exact import divide, is_integer, norms, paired_dots, signed
+from torchvsa.exact import cosines, is_integer, norms, signed
 from torchvsa.operators import entries, rotated
+
+Summands = Shaped[Tensor, "..."] | Sequence[Shaped[Tensor, "..."]]
+"""Hypervectors to bundle: stacked in one tensor, or in a list or tuple."""
+_DIM = "dim is the number of elements of a hypervector, a positive integer"
 
 
 class VSA(ABC):
@@ -32,9 +41,9 @@ class VSA(ABC):
     """Whether `bundle` needs the voters themselves, to decide split votes, and not just their sum."""
 
     def __init__(self, dim: int, dtype: torch.dtype) -> None:
-        if isinstance(dim, bool) or not isinstance(dim, int) or dim < 1:
-            raise ValueError(f"dim is the number of elements of a hypervector, a positive integer; got {dim!r}")
-        self.dim = dim
+        self.dim = whole_number(dim, _DIM)
+        if self.dim < 1:
+            raise ValueError(f"{_DIM}; got {dim!r}")
         self.dtype = dtype
 
     def __repr__(self) -> str:
@@ -53,7 +62,7 @@ class VSA(ABC):
     @property
     def integer(self) -> bool:
         """Whether hypervectors and raw accumulators hold integers, so that every sum is exact."""
-        return is_integer(torch.empty(0, dtype=self.dtype))
+        return not (self.dtype.is_floating_point or self.dtype.is_complex)
 
     @property
     def accumulator(self) -> torch.dtype:
@@ -63,7 +72,7 @@ class VSA(ABC):
     @property
     def row_bytes(self) -> int:
         """Bytes of one hypervector."""
-        return self.dim * torch.empty(0, dtype=self.dtype).element_size()
+        return self.dim * self.dtype.itemsize
 
     # -- what an architecture defines ------------------------------------------------------------------
 
@@ -103,11 +112,15 @@ class VSA(ABC):
         """Rotate the elements to the right: element `i` moves to `(i + shift) mod d`.
 
         `shifts` is one number, or a tensor with one for each hypervector (any shape that broadcasts with the
-        batch). Negative shifts rotate to the left.
+        batch). Negative shifts rotate to the left. Raises `ValueError` unless shifts are whole numbers, of a signed
+        integer type or uint8.
         """
         self.check(x, "x")
-        if isinstance(shifts, int):
-            return torch.roll(x, shifts, -1)
+        if not isinstance(shifts, Tensor):
+            shift = whole_number(shifts, "shifts are a whole number or a tensor of integers")
+            return torch.roll(x, shift % self.dim, -1)
+        if shifts.dtype not in INTEGERS:
+            raise ValueError(f"shifts are a whole number or a tensor of integers; got a tensor of {shifts.dtype}")
         return self._permuted(x, shifts)
 
     def _permuted(
@@ -117,18 +130,31 @@ class VSA(ABC):
         if shifts.shape != x.shape[:-1]:
             batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
             x, shifts = x.expand(*batch, self.dim), shifts.expand(batch)
-        starts = (-shifts).remainder(self.dim)
+        # Small types cannot hold every shift up to d, nor any type the negative of its lowest number.
+        starts = (-shifts.to(torch.int64).remainder(self.dim)).remainder(self.dim)
         return rotated(x.reshape(-1, self.dim), starts.reshape(-1), added).reshape(x.shape)
 
     def superpose(
-        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+        self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
     ) -> Shaped[Tensor, "..."]:
         """Sum `k` hypervectors over dimension `dim` into a raw accumulator.
 
-        `weights` holds one number per summand: `[k]`, or `[*batch, k]` for one in each batch element too. Integer
-        codes with integer weights stay exact. Raises `ShapeError` if `dim` is the hypervector dimension, or if the
-        weights do not fit.
+        Args:
+            xs: A tensor, `[..., k, d]` for the default `dim`, or a list or tuple of `k` tensors `[..., d]`.
+            dim: The dimension to sum over.
+            weights: One number per summand: `[k]`, or `[*batch, k]` for one in each batch element too.
+
+        Integers (bits count as votes) with integer weights give an exact sum in int32. Integers with float weights give
+        a sum in the weights' type, float32 at least; other summands keep their own type.
+
+        Raises:
+            ShapeError: `dim` is the hypervector dimension, or the weights do not fit.
+            ValueError: The sum does not fit int32, an intermediate product does not fit int64, or weights are NaN or
+                infinite. Where looking at values would stall or break something (on another device than the CPU, in
+                compiled and exported graphs, under `vmap`) only types are checked: there a sum of int8 codes fits if
+                `k` times the largest absolute weight is below 2^24, and one that does not fit wraps around.
         """
+        xs, dim = stacked(xs, dim)
         self.check(xs, "xs")
         if xs.dim() < 2 or dim in (-1, xs.dim() - 1):
             raise ShapeError(
@@ -137,21 +163,15 @@ class VSA(ABC):
             )
         votes = signed(xs)
         if weights is not None:
-            if weights.dim() == 0 or weights.shape[-1] != xs.shape[dim]:
-                raise ShapeError(
-                    f"weights must hold one number for each of {xs.shape[dim]} summands; got shape "
-                    f"{tuple(weights.shape)}"
-                )
-            if weights.is_floating_point() and is_integer(votes):
-                votes = votes.to(weights.dtype)
-            elif is_integer(votes):
-                votes = votes.to(torch.int32)
-            votes = votes.movedim(dim, -2) * weights.to(votes.dtype)[..., None]
-            dim = -2
-        return votes.sum(dim, dtype=self.accumulator if is_integer(votes) else None)
+            check_weights(weights, votes, xs.shape[dim])
+        if is_integer(votes) and not self.integer:
+            votes = votes.to(self.dtype)
+        if is_integer(votes) and (weights is None or not weights.is_floating_point()):
+            return integer_sum(votes, dim, weights)
+        return votes.sum(dim) if weights is None else weighted(votes, dim, weights)
 
     def bundle(
-        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+        self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
     ) -> Shaped[Tensor, "..."]:
         """Superpose `k` hypervectors into one that is similar to each of them: sum in one step, then normalise.
 
@@ -162,7 +182,7 @@ class VSA(ABC):
 
     def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """`bundle` of `a` and `b`, element by element of the (broadcast) batch."""
-        return self.bundle(torch.stack(torch.broadcast_tensors(a, b), -2))
+        return self.bundle([a, b])
 
     def bundle_entries(
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
@@ -193,10 +213,13 @@ class VSA(ABC):
         return self.permute(self.bundle_two(a, b), shifts)
 
     def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
-        """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything."""
+        """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything.
+
+        It does not depend on their lengths, however large or small. NaN where an element is NaN or infinite.
+        """
         self.check(a, "a")
         self.check(b, "b")
-        return divide(paired_dots(a, b), norms(a) * norms(b)).to(torch.float32)
+        return cosines(a, b).to(torch.float32)
 
     def positive(self, x: Shaped[Tensor, "*batch d"]) -> Bool[Tensor, "*batch d"]:
         """The elements that count as > 0, from which a self-derived shift takes its width."""
@@ -212,7 +235,27 @@ class VSA(ABC):
         """`norms(unbind(program, key))` for each key, in float64, without building the vectors where that pays."""
         return norms(self.unbind(program, keys))
 
+    def require_room(self, shape: Sequence[int], element_bytes: int, generator: torch.Generator | None = None) -> None:
+        """Raise `ValueError` unless hypervectors `[*shape, d]` fit into memory at so many bytes per element."""
+        if not torch.compiler.is_compiling() and (generator is None or generator.device.type == "cpu"):
+            count = math.prod(shape)
+            require_memory(
+                count * self.dim * element_bytes,
+                f"making {count} hypervectors of d = {self.dim} elements",
+                "take fewer dimensions, or some hypervectors at a time",
+            )
+
     def check(self, x: Tensor, argument: str) -> None:
         """Raise `ShapeError` unless `x` holds hypervectors of this dimension."""
         if x.dim() == 0 or x.shape[-1] != self.dim:
             raise ShapeError(f"{argument} must end in d = {self.dim} elements; got shape {tuple(x.shape)}")
+
+    def check_codes(self, x: Tensor, what: str) -> None:
+        """Raise `ValueError` unless `x` holds hypervectors as `random` draws them, or parts of them put together."""
+        self.check(x, what)
+        if x.dtype != self.dtype or not self._are_codes(x):
+            raise ValueError(f"{what} must hold codes of {self}; it holds other values, or another type ({x.dtype})")
+
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        """Whether the elements are such as a hypervector can have."""
+        return bool(x.isfinite().all())

@@ -4,8 +4,10 @@ import torch
 from jaxtyping import Float, Int, Shaped
 from torch import Tensor
 
-from torchvsa.architectures.base import VSA
+from torchvsa._checks import refuse_nan
+from torchvsa.architectures.base import VSA, Summands
 from torchvsa.architectures.draw import random_bits
+from torchvsa.architectures.sums import multiplied, stacked
 from torchvsa.architectures.ties import first_two
 from torchvsa.exact import norms, signed
 from torchvsa.operators import looked_up
@@ -33,10 +35,12 @@ class BSC(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: fair, independent bits."""
+        self.require_room(shape, 3, generator)
         return random_bits(*shape, self.dim, generator=generator, device=device).view(torch.bool)
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """No bit set."""
+        self.require_room((), self.dtype.itemsize)
         return torch.zeros(self.dim, dtype=torch.bool)
 
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
@@ -45,7 +49,7 @@ class BSC(VSA):
         self.check(b, "b")
         if a.dtype == torch.bool and b.dtype == torch.bool:
             return a ^ b
-        return signed(a) * signed(b)
+        return multiplied(signed(a), signed(b))
 
     def bind_entries(
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
@@ -61,16 +65,20 @@ class BSC(VSA):
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The majority. A raw sum no longer knows its voters, so its own majority, shifted by one, breaks ties."""
+        if raw.is_floating_point():
+            refuse_nan(raw, "the sum")
         return self._majority(raw, torch.roll(raw < 0, 1, -1))
 
     def bundle(
-        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+        self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
     ) -> Shaped[Tensor, "..."]:
         """See `VSA.bundle`: the majority of the bits."""
+        xs, dim = stacked(xs, dim)
         raw = self.superpose(xs, dim, weights)
         if (voters := first_two(xs, dim, weights)) is None:
             return self.normalize(raw)
-        return self._majority(raw, self.permute(self.bind(*voters), 1))
+        tie = self.bind(*voters)
+        return self._majority(raw, self.permute(tie if tie.dtype == torch.bool else tie < 0, 1))
 
     @staticmethod
     def _majority(raw: Tensor, tie: Tensor) -> Tensor:

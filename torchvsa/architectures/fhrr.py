@@ -7,7 +7,7 @@ from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide, root
+from torchvsa.exact import divide, root, units
 
 
 class FHRR(VSA):
@@ -29,6 +29,7 @@ class FHRR(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: angles uniform in [-π, π)."""
+        self.require_room(shape, 2 * self.dtype.itemsize, generator)
         source = generator.device if generator is not None else device
         real = torch.float64 if self.dtype == torch.complex128 else torch.float32
         angles = torch.rand(*shape, self.dim, generator=generator, device=source, dtype=real) * (2 * math.pi) - math.pi
@@ -36,6 +37,7 @@ class FHRR(VSA):
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """All ones: every angle 0."""
+        self.require_room((), self.dtype.itemsize)
         return torch.ones(self.dim, dtype=self.dtype)
 
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
@@ -56,6 +58,9 @@ class FHRR(VSA):
         """Scale every element to length 1; zero stays zero."""
         return divide(raw, raw.abs())
 
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        return bool(((x.abs() - 1).abs() < 1e-3).all())
+
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
@@ -64,4 +69,5 @@ class FHRR(VSA):
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `|key|² · |program|²`: one product for the whole batch."""
-        return root(keys.abs() ** 2 @ (program.abs() ** 2))
+        unit = units(program)
+        return root(keys.abs() ** 2 @ ((program.abs() / unit) ** 2)) * unit.to(torch.float64)

@@ -5,7 +5,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide, norms
+from torchvsa.exact import divide, in_range
 
 
 class HRR(VSA):
@@ -28,12 +28,14 @@ class HRR(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: normal with mean 0 and variance 1/d."""
+        self.require_room(shape, 2 * self.dtype.itemsize, generator)
         source = generator.device if generator is not None else device
         normal = torch.randn(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
         return (normal / self.dim**0.5).to(device if device is not None else source)
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """One at index 0, zero elsewhere."""
+        self.require_room((), self.dtype.itemsize)
         unit = torch.zeros(self.dim, dtype=self.dtype)
         unit[0] = 1
         return unit
@@ -61,7 +63,12 @@ class HRR(VSA):
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Scale to length 1; zero stays zero."""
-        return divide(raw, norms(raw)[..., None].to(raw.dtype))
+        rows, lengths, _ = in_range(raw)
+        return divide(rows, lengths[..., None].to(rows.dtype))
+
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        # Ten standard deviations: no element of a drawn hypervector is ever so far from 0.
+        return bool((x.abs() <= 10 / self.dim**0.5).all())
 
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]

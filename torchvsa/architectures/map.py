@@ -6,10 +6,12 @@ import torch
 from jaxtyping import Float, Int, Shaped
 from torch import Tensor
 
-from torchvsa.architectures.base import VSA
+from torchvsa._checks import narrowed, refuse_nan
+from torchvsa.architectures.base import VSA, Summands
 from torchvsa.architectures.draw import random_bits
+from torchvsa.architectures.sums import multiplied, stacked
 from torchvsa.architectures.ties import first_two
-from torchvsa.exact import dots, is_integer, root
+from torchvsa.exact import dots, is_integer, root, units, widened
 from torchvsa.operators import looked_up
 
 
@@ -23,7 +25,9 @@ class MAP(VSA):
     | I | -1 / +1 | the sum |
 
     `dtype=torch.float32` is differentiable; `torch.int8` holds integer codes, exact and smallest, whose sums
-    accumulate in int32.
+    accumulate in int32. Codes in int8 must be -1, 0 or +1, which no verb checks: others may wrap around in `bind`,
+    `bundle_two`, records and protections. `superpose`, `bundle` and `similarity` are right for any int8 numbers, as is
+    every verb for accumulators in int32.
 
     Source: Gayler 1998; Neubert et al. 2016, section II (variant C).
     """
@@ -58,6 +62,9 @@ class MAP(VSA):
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """See `VSA.random`: bipolar -1 / +1 with equal chance, or uniform in [-1, 1]."""
+        # Bits, codes made of them, and those in another type; or uniform numbers, twice moved.
+        size = self.dtype.itemsize
+        self.require_room(shape, 3 * size if size == 1 or self.atoms == "uniform" else 2 + size, generator)
         if self.atoms == "uniform":
             source = generator.device if generator is not None else device
             uniform = torch.rand(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
@@ -67,13 +74,18 @@ class MAP(VSA):
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """All ones."""
+        self.require_room((), self.dtype.itemsize)
         return torch.ones(self.dim, dtype=self.dtype)
 
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """The element-wise product; its own inverse on -1 / +1."""
+        """The element-wise product; its own inverse on -1 / +1.
+
+        Two raw accumulators of integers are refused (`ValueError`) if a product does not fit their type, where values
+        can be looked at: see `superpose`.
+        """
         self.check(a, "a")
         self.check(b, "b")
-        return a * b
+        return multiplied(a, b)
 
     def unbind(
         self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
@@ -81,26 +93,29 @@ class MAP(VSA):
         """The element-wise product again: exact for keys of -1 / +1."""
         self.check(bound, "bound")
         self.check(key, "key")
-        return bound * key
+        return multiplied(bound, key)
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """C: clip to [-1, 1], keeping 0; integer codes are the nearest ones. I: the sum itself. B: the sign.
 
         A raw sum no longer knows its voters, so B decides its zeros by the sum's own signs, shifted by one.
         """
+        if raw.is_floating_point() and (self.integer or self.variant == "B"):
+            refuse_nan(raw, "the sum")
         if self.variant == "C":
             clipped = raw.clamp(-1, 1)
             # A cast alone would cut a sum of fractions such as 0.9999999 down to 0.
             nearest = clipped.round() if self.dtype == torch.int8 and raw.is_floating_point() else clipped
             return nearest.to(self.dtype)
         if self.variant == "I":
-            return raw.to(self.accumulator) if is_integer(raw) else raw
+            return self._accumulated(raw) if is_integer(raw) else raw
         return self._signs(raw, torch.roll(torch.where(raw >= 0, 1, -1), 1, -1))
 
     def bundle(
-        self, xs: Shaped[Tensor, "..."], dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
+        self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
     ) -> Shaped[Tensor, "..."]:
         """See `VSA.bundle`; the variants differ as the class says."""
+        xs, dim = stacked(xs, dim)
         raw = self.superpose(xs, dim, weights)
         if self.variant == "B" and (voters := first_two(xs, dim, weights)) is not None:
             return self._signs(raw, self.permute(self.bind(*voters), 1))
@@ -122,7 +137,8 @@ class MAP(VSA):
 
     def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
         """See `VSA.bundle_two`."""
-        if self.variant != "C":
+        whole = is_integer(a) or is_integer(b)
+        if self.variant != "C" or (whole and not a.dtype == b.dtype == torch.int8):
             return super().bundle_two(a, b)
         # Two elements of [-1, 1] add up within the codes' own type.
         return self.normalize(a + b)
@@ -136,7 +152,19 @@ class MAP(VSA):
         return self._permuted(a, shifts, b)
 
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
+        if tie.dtype != self.dtype:
+            tie = tie.sign()  # a product of accumulators may not fit the codes' type
         return torch.where(raw == 0, tie, raw.sign()).to(self.dtype)
+
+    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
+        return bool((x.abs() <= 1).all() if self.atoms == "uniform" else ((x == 1) | (x == -1)).all())
+
+    def _accumulated(self, raw: Tensor) -> Tensor:
+        return (
+            narrowed(raw, torch.int32, "the sum")
+            if raw.dtype == torch.int64 and self.integer
+            else raw.to(self.accumulator)
+        )
 
     def separate(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
@@ -154,6 +182,9 @@ class MAP(VSA):
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `key² · program²`: one product for the whole batch."""
-        wide = torch.float64 if is_integer(program) else program.dtype
-        squares = dots(keys.to(wide) ** 2, program.to(wide)[None] ** 2)[..., 0]
-        return root(squares)
+        if is_integer(program):
+            return root(dots(keys.to(torch.float64) ** 2, program.to(torch.float64)[None] ** 2)[..., 0])
+        program = widened(program)
+        unit = units(program)
+        squares = dots(keys.to(program.dtype) ** 2, (program / unit)[None] ** 2)[..., 0]
+        return root(squares) * unit.to(torch.float64)

@@ -1,8 +1,8 @@
 """How the role-bound values of one record become one hypervector.
 
-A combination is a small class with three jobs: `bound` makes the table of role-bound values `[n, V, d]`;
-`unobserved` gives the entry that stands, at index V, for a value that was not observed; `join` looks up and combines
-the entries of each record.
+A combination is a small class with four jobs: `arrange` draws what it needs beside roles and values; `bound` makes the
+table of role-bound values `[n, V, d]` from these three; `unobserved` gives the entry that stands, at index V, for a
+value that was not observed; `join` looks up and combines the entries of each record.
 """
 
 from abc import ABC, abstractmethod
@@ -25,18 +25,30 @@ class Combination(ABC):
     """Turns the n role-bound values of a record into its hypervector."""
 
     name: ClassVar[str]
+    copies: ClassVar[int] = 2
+    """Tables that are held at the same time while one is made."""
 
     def __init__(self, vsa: VSA) -> None:
         self.vsa = vsa
 
+    def arrange(self, sensors: int, generator: torch.Generator | None) -> Shaped[Tensor, "n d"] | None:
+        """Draw what tells the sensors apart beside their roles; None for nothing."""
+        return None
+
+    @property
+    def arranged(self) -> torch.dtype | None:
+        """The type of what `arrange` draws; None for nothing."""
+        return None
+
     def bound(
-        self,
-        roles: Shaped[Tensor, "n d"],
-        values: Shaped[Tensor, "levels d"],
-        generator: torch.Generator | None,
+        self, roles: Shaped[Tensor, "n d"], values: Shaped[Tensor, "levels d"], arrangement: Tensor | None
     ) -> Shaped[Tensor, "n levels d"]:
         """The table of role-bound values."""
         return self.vsa.bind(roles[:, None], values)
+
+    def bytes_to_make(self, sensors: int, levels: int) -> int:
+        """Memory that making the table takes at its peak."""
+        return self.copies * sensors * (levels + 1) * self.vsa.row_bytes
 
     @abstractmethod
     def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
@@ -66,7 +78,7 @@ class Bundled(Combination):
         # The voters themselves decide ties, so they are needed side by side.
         sensors = torch.arange(len(table), device=table.device)
         return by_blocks(
-            lambda rows: self.vsa.bundle(table[sensors, rows], weights=(rows >= 0).int()),
+            lambda rows: self.vsa.bundle(table[sensors, rows], weights=rows >= 0),
             indices,
             row_bytes=len(table) * self.vsa.row_bytes,
         )
@@ -82,21 +94,28 @@ class Bound(Combination):
     """
 
     name = "bind"
+    copies = 3
+
+    def arrange(self, sensors: int, generator: torch.Generator | None) -> Shaped[Tensor, "n d"] | None:
+        """An order of the elements for each sensor, where a rotation would not do; the first keeps its own."""
+        if self.vsa.elementwise:
+            return None
+        orders = [torch.randperm(self.vsa.dim, generator=generator) for _ in range(sensors - 1)]
+        return torch.stack([torch.arange(self.vsa.dim), *orders])
+
+    @property
+    def arranged(self) -> torch.dtype | None:
+        """See `Combination.arranged`."""
+        return None if self.vsa.elementwise else torch.int64
 
     def bound(
-        self,
-        roles: Shaped[Tensor, "n d"],
-        values: Shaped[Tensor, "levels d"],
-        generator: torch.Generator | None,
+        self, roles: Shaped[Tensor, "n d"], values: Shaped[Tensor, "levels d"], arrangement: Tensor | None
     ) -> Shaped[Tensor, "n levels d"]:
         """The role-bound values, those of each sensor permuted in its own way."""
-        table = super().bound(roles, values, generator)
-        if not self.vsa.elementwise:
-            orders = [torch.randperm(self.vsa.dim, generator=generator).to(table.device) for _ in roles[1:]]
-            return torch.stack(
-                [table[0], *(entries[:, order] for entries, order in zip(table[1:], orders, strict=True))]
-            )
-        return self.vsa.permute(table, torch.arange(len(roles), device=roles.device)[:, None])
+        table = super().bound(roles, values, arrangement)
+        if self.vsa.elementwise or arrangement is None:
+            return self.vsa.permute(table, torch.arange(len(roles), device=roles.device)[:, None])
+        return torch.stack([entries[:, order] for entries, order in zip(table, arrangement, strict=True)])
 
     def unobserved(self, like: Shaped[Tensor, "n levels d"]) -> Shaped[Tensor, "d"]:
         """The identity of binding."""
@@ -127,19 +146,29 @@ class SubsetBound(Bound):
             )
         self.subset = subset
 
-    def bound(
-        self,
-        roles: Shaped[Tensor, "n d"],
-        values: Shaped[Tensor, "levels d"],
-        generator: torch.Generator | None,
-    ) -> Shaped[Tensor, "n levels d"]:
-        """The role-bound values, those of sensors outside a dimension's subset replaced by the identity."""
-        table = super().bound(roles, values, generator)
-        sensors = len(roles)
+    def bytes_to_make(self, sensors: int, levels: int) -> int:
+        """See `Combination.bytes_to_make`; an order of the sensors for each dimension is drawn as well, in int64."""
+        return max(super().bytes_to_make(sensors, levels), 2 * 8 * sensors * self.vsa.dim)
+
+    def arrange(self, sensors: int, generator: torch.Generator | None) -> Shaped[Tensor, "n d"] | None:
+        """Which sensors each dimension sees: true or false for each of both."""
         most = min(self.subset or sensors, sensors)
         sizes = torch.randint(1, most + 1, (self.vsa.dim,), generator=generator)
         ranks = torch.stack([torch.randperm(sensors, generator=generator) for _ in range(self.vsa.dim)], -1)
-        return torch.where((ranks < sizes)[:, None].to(table.device), table, self.unobserved(table))
+        return ranks < sizes
+
+    @property
+    def arranged(self) -> torch.dtype | None:
+        """See `Combination.arranged`."""
+        return torch.bool
+
+    def bound(
+        self, roles: Shaped[Tensor, "n d"], values: Shaped[Tensor, "levels d"], arrangement: Tensor | None
+    ) -> Shaped[Tensor, "n levels d"]:
+        """The role-bound values, those of sensors outside a dimension's subset replaced by the identity."""
+        assert arrangement is not None
+        table = super().bound(roles, values, None)
+        return torch.where(arrangement[:, None], table, self.unobserved(table))
 
 
 COMBINATIONS: dict[str, type[Combination]] = {c.name: c for c in (Bundled, Bound, SubsetBound)}

@@ -1,14 +1,21 @@
 """A threshold per dimension: records whose elements each ask about a few sensors."""
 
 import torch
-from jaxtyping import Int, Shaped
+from jaxtyping import Int, Int64, Shaped
 from torch import Tensor, nn
 
+from torchvsa._checks import whole_number
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
-from torchvsa.errors import ShapeError
+from torchvsa.blocks import by_blocks
+from torchvsa.encoding.indices import check_indices
 
 _CONSTANT = 1 / 16
 """The share of dimensions that ask nothing: few, and enough to carry a constant answer."""
+
+_BYTES = 16
+"""What comparing one index for one dimension takes: a copy of it in int64, and some truth values."""
+_BLOCK_BYTES = 2**28
 
 
 class Thresholds(nn.Module):
@@ -44,6 +51,7 @@ class Thresholds(nn.Module):
         generator: torch.Generator | None = None,
     ) -> None:
         super().__init__()
+        sensors, levels = whole_number(sensors, "sensors is a number"), whole_number(levels, "levels is a number")
         if sensors < 1 or levels < 1:
             raise ValueError(f"a record needs at least one sensor and one level; got {sensors} and {levels}")
         if subset is not None and subset < 1:
@@ -52,6 +60,12 @@ class Thresholds(nn.Module):
             )
         self.vsa, self.sensors, self.levels = vsa, sensors, levels
         most = min(subset or sensors, sensors)
+        # An order of all sensors is sorted in float32 and int64, and three buffers are made in two steps.
+        require_memory(
+            max(28 * sensors, 48 * most) * vsa.dim + 2 * vsa.row_bytes,
+            f"thresholds of {sensors} sensors, up to {most} in each of d = {vsa.dim} dimensions",
+            "take fewer dimensions or a smaller subset",
+        )
         self.register_buffer("start", vsa.random(generator=generator))
         sizes = torch.randint(1, most + 1, (vsa.dim,), generator=generator)
         constant = torch.rand(vsa.dim, generator=generator) < _CONSTANT
@@ -73,15 +87,33 @@ class Thresholds(nn.Module):
         self.register_buffer("threshold", torch.where(spare, threshold[0], threshold))
         self.register_buffer("above", torch.where(spare, above[0], above))
 
-    def forward(self, indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """Encode each row of indices in `[-1, levels)`.
+    @staticmethod
+    def layout(vsa: VSA, sensors: int, subset: int | None = None) -> dict[str, tuple[torch.dtype, tuple]]:
+        """The types and shapes of the tensors of such an encoder, found without making it."""
+        shape = min(subset or sensors, sensors), vsa.dim
+        layout = {"start": (vsa.dtype, (vsa.dim,)), "sensor": (torch.int64, shape), "threshold": (torch.int64, shape)}
+        return layout | {"above": (torch.bool, shape)}
 
-        Raises `ShapeError` unless the rows have one index per sensor.
+    def check(self) -> None:
+        """Raise `ValueError` naming the tensor if one asks about what is not there."""
+        self.vsa.check_codes(self.start, "start")
+        for name, end in (("sensor", self.sensors), ("threshold", self.levels)):
+            tensor = getattr(self, name)
+            if not ((tensor >= 0) & (tensor < end)).all():
+                raise ValueError(f"{name} must hold numbers in [0, {end})")
+
+    def forward(self, indices: Int[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
+        """Encode each row of indices in `[-1, levels)`; -1 is *unobserved*.
+
+        Raises `ShapeError` unless the rows have one index per sensor, and `ValueError` for an index outside of that
+        range or of a type other than a signed integer or uint8. Values are checked on a CPU; another device asserts
+        them without being waited for, and graphs and `vmap` do not check them.
         """
-        if indices.dim() != 2 or indices.shape[1] != self.sensors:
-            raise ShapeError(
-                f"indices must be [batch, {self.sensors}], one column per sensor; got {tuple(indices.shape)}"
-            )
+        # Blocks bound what the comparisons of whole columns take beside the answer.
+        rows = check_indices(indices, self.sensors, self.levels)
+        return by_blocks(self._encode, rows, row_bytes=_BYTES * self.vsa.dim, block_bytes=_BLOCK_BYTES)
+
+    def _encode(self, indices: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         # Dimension by dimension: whole columns are copied and compared far faster than rows are gathered.
         columns = indices.T.contiguous()
         missing = columns < 0

@@ -6,7 +6,10 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
+
+_FEWER = "take fewer levels or dimensions"
 
 
 def lookup(vsa: VSA, levels: int, generator: torch.Generator | None = None) -> Shaped[Tensor, "levels d"]:
@@ -33,6 +36,12 @@ def level(
     if span < 1:
         raise ValueError(f"span counts the levels over which similarity falls to 0, at least 1; got {span}")
     segments = -(-(levels - 1) // span) if levels > 1 else 0
+    # Codes are made one by one, then stacked.
+    require_memory(
+        (2 * levels + segments + 1) * vsa.row_bytes + 9 * vsa.dim,
+        f"level codes of {levels} levels and d = {vsa.dim}",
+        _FEWER,
+    )
     anchors = vsa.random(segments + 1, generator=generator)
     order = torch.randperm(vsa.dim, generator=generator)
     codes = []
@@ -55,6 +64,10 @@ def balanced(vsa: VSA, levels: int, generator: torch.Generator | None = None) ->
 
     Source: a simplex of code words, as in error-correcting output codes (Dietterich and Bakiri 1995).
     """
+    # Random numbers are sorted, along a dimension that is copied for it, in float32 and int64.
+    require_memory(
+        levels * (28 * vsa.dim + 2 * vsa.row_bytes), f"balanced codes of {levels} levels and d = {vsa.dim}", _FEWER
+    )
     start = vsa.random(generator=generator)
     ranks = torch.rand(levels, vsa.dim, generator=generator).argsort(0)
     negated = (2 * ranks < levels).to(start.device)

@@ -1,15 +1,16 @@
 """Clean-up memory: the known item that a noisy hypervector resembles most."""
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import torch
 from jaxtyping import Float, Int, Shaped
 from torch import Tensor, nn
 
+from torchvsa._checks import readable
 from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
-from torchvsa.exact import dots, norms, scaled
+from torchvsa.exact import dots, in_range, norms, ordinary, scaled, units, widened
 
 _PRODUCT_BYTES = 2**27
 """Products held at once; more queries are answered some at a time."""
@@ -30,42 +31,40 @@ def best(scores: Float[Tensor, "*batch k"], lengths: Float[Tensor, "*batch"]) ->
     """The best of `k` scores (inner products over the items' lengths), as cosines with queries of these lengths."""
     top, index = scores.max(-1)
     if scores.shape[-1] == 1:
-        lead = torch.full_like(top, torch.inf)
+        lead = torch.where(top.isnan(), top, torch.inf)
     else:
         lead = top - scores.scatter(-1, index[..., None], -torch.inf).amax(-1)
     # A query of length 0 has the score 0 with every item.
-    lengths = torch.where(lengths > 0, lengths, 1.0)
+    lengths = torch.where(lengths == 0, 1.0, lengths)
     return Match(index, (top / lengths).to(torch.float32), (lead / lengths).to(torch.float32))
 
 
 class CleanUp(nn.Module):
     """Compare queries `[..., d]` with items `[K, d]` by cosine and answer with the best.
 
-    Scores are compared in float64 from exact inner products, so that the answer for integer codes does not
-    depend on batch size, threads or device. Raises `ShapeError` without items.
+    Products of integers are exact and compared in float64, so that the answer does not depend on batch size, threads or
+    device. Products of floats are found in their own type, float32 at least; lengths of items, quotients and
+    comparisons are in float64. Answers do not depend on the scale of queries and items, however large or small.
+
+    A query with an element that is NaN or infinite is answered with a similarity and margin of NaN: its index means
+    nothing. Such items raise `ValueError` on a CPU; where looking at values would stall or break something (on another
+    device, in graphs, under `vmap`) all similarities are NaN.
+
+    Nothing but `items` is kept, whose lengths are found anew at each call: they may change in any way. Raises
+    `ShapeError` without items.
 
     Source: Neubert et al. 2016, section II.
     """
 
     items: Tensor
-    lengths: Tensor
 
     def __init__(self, items: Shaped[Tensor, "k d"]) -> None:
         super().__init__()
-        if items.dim() != 2 or len(items) == 0:
-            raise ShapeError(f"a clean-up memory needs items [K, d] with K at least 1; got shape {tuple(items.shape)}")
+        if items.dim() != 2 or items.numel() == 0:
+            raise ShapeError(
+                f"a clean-up memory needs items [K, d] with K and d at least 1; got shape {tuple(items.shape)}"
+            )
         self.register_buffer("items", items)
-        self.lengths = norms(items)
-
-    def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "CleanUp":
-        # The lengths follow the items wherever they go, but stay in float64 whatever type the items take.
-        super()._apply(fn, recurse)
-        self.lengths = norms(self.items)
-        return self
-
-    def _load_from_state_dict(self, *args: Any, **kwargs: Any) -> None:
-        super()._load_from_state_dict(*args, **kwargs)
-        self.lengths = norms(self.items)
 
     def forward(self, queries: Shaped[Tensor, "*batch d"]) -> Match:
         """The index, similarity and margin of the best item for each query."""
@@ -73,15 +72,42 @@ class CleanUp(nn.Module):
             raise ShapeError(
                 f"queries must end in d = {self.items.shape[-1]} elements; got shape {tuple(queries.shape)}"
             )
+        items, lengths = self._in_range()
         rows = queries.reshape(-1, queries.shape[-1])
-        match = by_blocks(self._best, rows, row_bytes=8 * len(self.items), block_bytes=_PRODUCT_BYTES)
+        best_of = partial(_best, items=items, lengths=lengths)
+        match = by_blocks(best_of, rows, row_bytes=8 * len(items), block_bytes=_PRODUCT_BYTES)
         return Match(*(answer.reshape(queries.shape[:-1]) for answer in match))
 
-    def _best(self, rows: Shaped[Tensor, "batch d"]) -> Match:
-        # No item wins by the length of the query, so that floats may round it: that is read off in one pass.
-        lengths = torch.linalg.vector_norm(rows, dim=-1) if rows.is_floating_point() else norms(rows)
-        # The products of many rows are found fastest together, and looked through while in the cache.
-        return by_blocks(self._look_through, dots(rows, self.items), lengths, row_bytes=24 * len(self.items))
+    def _in_range(self) -> tuple[Shaped[Tensor, "k d"], Float[Tensor, "k"]]:
+        if self.items.dtype == torch.int8:
+            return self.items, norms(self.items)
+        items, lengths, _ = in_range(self.items)
+        if readable(lengths) and (wrong := lengths.isnan()).any():
+            raise ValueError(f"items must be finite; item {wrong.nonzero()[0].item()} holds NaN or infinity")
+        return items, lengths
 
-    def _look_through(self, products: Shaped[Tensor, "batch k"], lengths: Float[Tensor, "batch"]) -> Match:
-        return best(scaled(products, self.lengths), lengths)
+
+def _best(rows: Shaped[Tensor, "batch d"], items: Shaped[Tensor, "k d"], lengths: Float[Tensor, "k"]) -> Match:
+    rows, own = _measured(rows)
+    # The products of many rows are found fastest together, and looked through while in the cache.
+    work = partial(_look_through, items=lengths)
+    return by_blocks(work, dots(rows, items), own, row_bytes=24 * len(items))
+
+
+def _measured(rows: Shaped[Tensor, "batch d"]) -> tuple[Shaped[Tensor, "batch d"], Float[Tensor, "batch"]]:
+    """Queries in a range where products fit, and their lengths."""
+    if rows.dtype == torch.int8:
+        return rows, norms(rows)
+    rows = widened(rows)
+    if not rows.is_floating_point():
+        return in_range(rows)[:2]
+    # No item wins by the length of the query, so that floats may round it: that is read off in one pass.
+    lengths = torch.linalg.vector_norm(rows, dim=-1)
+    if ordinary(lengths):
+        return rows, lengths
+    rows = rows / units(rows)
+    return rows, torch.linalg.vector_norm(rows, dim=-1)
+
+
+def _look_through(products: Shaped[Tensor, "batch k"], own: Float[Tensor, "batch"], items: Float[Tensor, "k"]) -> Match:
+    return best(scaled(products, items), own)
