@@ -167,9 +167,9 @@ def _check_file(tensors: dict[str, Tensor], about: Any) -> None:
     for name, dtype in _TYPES.items():
         if tensors[name].dtype != dtype:
             raise ValueError(f"{name} must be of type {dtype}; got {tensors[name].dtype}")
-    if not isinstance(about, dict) or not {"rows"} <= set(about) <= {"rows", *_NAMES}:
-        raise ValueError(f"its description must hold 'rows' and may hold {', '.join(_NAMES)}; got {about!r:.200}")
-    rows = about["rows"]
+    if not isinstance(about, dict) or not set(about) <= {"rows", *_NAMES}:
+        raise ValueError(f"its description must hold nothing but rows, {', '.join(_NAMES)}; got {about!r:.200}")
+    rows = about.get("rows", len(tensors["sensors"]) if tensors["sensors"].dim() else 0)
     if type(rows) is not int or tensors["sensors"].shape[:1] != (rows,):
         raise ValueError(f"rows is {rows!r:.200}, but sensors has shape {tuple(tensors['sensors'].shape)}")
     for name in _NAMES:

@@ -5,6 +5,7 @@ them when they are asked for.
 """
 
 import sys
+from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -90,7 +91,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
                 )
             space = self._class_space(readings)
             shown = Demonstrations(torch.tensor(readings), torch.tensor(labels[:, None]))
-            self.behaviour_ = self._finite(self._rule(space.seed).fit(space, shown, self._progress()))
+            self.behaviour_ = self._trained(lambda: self._rule(space.seed).fit(space, shown, self._progress()))
         return self
 
     def partial_fit(self, X: Any, y: Any, classes: Any = None) -> Self:  # noqa: N803
@@ -123,7 +124,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
             # Another seed for each call, or all would visit their rows in the same order.
             rule = self._rule(before.space.seed + before.report.updates)
             shown = Demonstrations(torch.tensor(readings), labels)
-            self.behaviour_ = self._finite(rule.partial_fit(before, shown))
+            self.behaviour_ = self._trained(lambda: rule.partial_fit(before, shown))
             self._progress()(1.0)
         return self
 
@@ -143,11 +144,14 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         passes, batch, rate = self._whole("passes"), self._whole("batch"), self._positive("learning_rate")
         return Gradient(passes=passes, batch=batch, learning_rate=rate, sparse=True, seed=seed)
 
-    def _finite(self, behaviour: Behaviour) -> Behaviour:
-        """The behaviour, unless training left the numbers."""
-        if not behaviour.program.isfinite().all():
-            raise ValueError(f"training diverged with learning_rate={self.learning_rate}; take a lower one")
-        return behaviour
+    def _trained(self, train: Callable[[], Behaviour]) -> Behaviour:
+        """What `train` answers; where its program left the numbers, an error that names the reason."""
+        try:
+            return train()
+        except ValueError as error:
+            if "not finite" not in str(error):
+                raise
+            raise ValueError(f"training diverged with learning_rate={self.learning_rate}; take a lower one") from error
 
     def _blank(self, space: Space) -> Behaviour:
         """The behaviour that knows all classes and no condition."""
