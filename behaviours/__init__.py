@@ -5,13 +5,15 @@ from typing import TYPE_CHECKING, Any
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition import POLICIES, Bundle, Policy, Priority
+from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
+from behaviours.edges import quantile_edges
 from behaviours.learning import RULES, ErrorDriven, Gradient, LeastSquares, OneShot, Rule
 from behaviours.recall import Recall
 from behaviours.reflex import Reflex
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Schema, Sensor
-from behaviours.space import Encoder, Space
+from behaviours.space import Space
 
 if TYPE_CHECKING:
     from behaviours.estimators import BehaviourClassifier as BehaviourClassifier
@@ -24,8 +26,8 @@ __all__ = [
     "Behaviour",
     "BehaviourBank",
     "Bundle",
+    "Controller",
     "Demonstrations",
-    "Encoder",
     "ErrorDriven",
     "Gradient",
     "LearningReport",
@@ -39,6 +41,7 @@ __all__ = [
     "Schema",
     "Sensor",
     "Space",
+    "quantile_edges",
 ]
 
 

@@ -10,7 +10,6 @@ from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import OneShot, Rule
 from behaviours.progress import Progress, silent
-from behaviours.remembering import RememberingSpace
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from behaviours.storage import Layout, check_layout, load_tensors, naming, save_tensors
@@ -99,7 +98,7 @@ class BehaviourBank(nn.Module):
         finite, codebooks of another type than the architecture's (after `.half()`).
         """
         space = self.space.config()
-        tensors = {f"space.{key}": value for key, value in self.space.codebooks().items()}
+        tensors = {f"space.{key}": value for key, value in self.space.state_dict().items()}
         check_layout(tensors, _codebooks(space))
         for number, name in enumerate(self):
             behaviour = self[name]
@@ -134,7 +133,7 @@ class BehaviourBank(nn.Module):
             if wrong := sorted(parts ^ (tensors.keys() - codebooks.keys())):
                 raise ValueError(f"tensor {wrong[0]!r} is {'missing' if wrong[0] in parts else 'not described'}")
             with naming("space"):
-                space = _kind(about["space"]).from_config(
+                space = Space.from_config(
                     about["space"], {name.removeprefix("space."): tensors[name] for name in codebooks}
                 )
             bank = cls(space)
@@ -147,17 +146,10 @@ class BehaviourBank(nn.Module):
 
 
 _PARTS = ("program", "known", "results")
-_SPACES: dict[str, type[Space]] = {"space": Space, "remembering": RememberingSpace}
-
-
-def _kind(config: dict[str, Any]) -> type[Space]:
-    if config["kind"] not in _SPACES:
-        raise ValueError(f"there is no space of kind {config['kind']!r}; there are {', '.join(_SPACES)}")
-    return _SPACES[config["kind"]]
 
 
 def _codebooks(config: dict[str, Any]) -> Layout:
-    return {f"space.{name}": wanted for name, wanted in _kind(config).layout(config).items()}
+    return {f"space.{name}": wanted for name, wanted in Space.layout(config).items()}
 
 
 def check_name(name: object) -> None:

@@ -6,9 +6,10 @@ import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
+from behaviours.controller import Controller
 from behaviours.folding import Folded
 from behaviours.memory import ResultMemory, check_levels
-from behaviours.recall import Recall, asked_once, scores
+from behaviours.recall import Recall, scores
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA, ShapeError
@@ -16,7 +17,7 @@ from torchvsa.blocks import by_blocks
 from torchvsa.exact import is_integer, norms, signed
 
 
-class Behaviour(nn.Module):
+class Behaviour(Controller):
     """A behaviour as one hypervector, `program` `[d]`; called with readings `[B, n]` it answers with commands.
 
     `known` `[d]` is the sum of the conditions that it knows; both are raw accumulators, see `clipped`. `memory`
@@ -57,7 +58,7 @@ class Behaviour(nn.Module):
 
     def over(self, space: Space) -> "Behaviour":
         """The same behaviour over a space with equal codebooks, on its device."""
-        device = space.results.codes.device
+        device = space.device
         program = self.program.detach().to(device)
         if isinstance(self.program, nn.Parameter):
             program = nn.Parameter(program)
@@ -68,20 +69,11 @@ class Behaviour(nn.Module):
         """The stored results as levels of the actuators, in order of first insertion."""
         return self.memory.levels
 
-    def forward(self, readings: Any) -> Recall:
-        """Commands `[B, m]` for readings `[B, n]`, with similarity, margin and familiarity (see `Recall`).
-
-        Raises an error that names sensor, row and range for readings that are not valid. A graph (`torch.compile`,
-        `torch.export`) takes readings as a tensor and cannot raise: there, those out of range are clipped.
-        """
-        bins = self.space.bins(readings)
-        return asked_once(self._answer, bins).blank((bins < 0).all(-1))
-
-    def _answer(self, bins: Int64[Tensor, "batch n"]) -> Recall:
+    def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         folded = self._folded()
         # Some rows at a time go all the way to a few products, so that their conditions never leave the cache.
         products = by_blocks(
-            lambda rows: folded.products(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes
+            lambda rows: folded.products(self.space.encode(rows)), cells, row_bytes=self.space.vsa.row_bytes
         )
         return folded.recall(products, self.memory.commands)
 
@@ -115,7 +107,7 @@ class Behaviour(nn.Module):
         In float64, and differentiable by the program, see `trainable`.
         """
         items = self.memory.items
-        return scores(self.space.vsa, self.program, self.space.encode(self.space.bins(readings)), items, norms(items))
+        return scores(self.space.vsa, self.program, self.space.encode(self.space.cells(readings)), items, norms(items))
 
     def labels(self, commands: Any) -> Int64[Tensor, "batch"]:
         """Where each row of commands `[B, m]` stands in `results`; raises `ValueError` if it is not stored."""

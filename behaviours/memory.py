@@ -38,7 +38,7 @@ class ResultMemory(nn.Module):
     def derive(self) -> None:
         """Compute `items` and `commands` from `levels` and the codebooks."""
         (space,) = self._space
-        self.items = space.results(self.levels)
+        self.items = space.items(self.levels)
         self.commands = decode(space, self.levels, self.items)
         self._derived_from = tuple(tensor.clone() for tensor in self._sources())
 
@@ -52,7 +52,7 @@ class ResultMemory(nn.Module):
 
     def _sources(self) -> tuple[Tensor, ...]:
         (space,) = self._space
-        return self.levels, space.results.codes, space.results.roles, space.results.table
+        return self.levels, *space.results.state_dict().values()
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "ResultMemory":
         # Commands stay in float64, and go with the levels to another device.
@@ -98,7 +98,7 @@ def decode(space: Space, levels: Int64[Tensor, "k m"], items: Shaped[Tensor, "k 
     columns = []
     for actuator in range(levels.shape[1]):
         stored = in_order_of_appearance(levels[:, actuator])
-        values = CleanUp(space.results.codes[stored])
+        values = CleanUp(space.results.value.encode(stored))
         noisy = space.vsa.unbind(items, space.results.roles[actuator])
         columns.append(stored[values(noisy).index])
     return space.schema.command_values(torch.stack(columns, -1))

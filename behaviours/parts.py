@@ -3,15 +3,11 @@
 import math
 import operator
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from numbers import Real
 from typing import Literal
 
 import numpy as np
-
-from behaviours.tables import numbers
 
 _MOST_LEVELS = 2**31
 _ULPS = 4
@@ -58,9 +54,7 @@ def most_parts(low: float, high: float) -> float:
 class Sensor:
     """A real-valued sensor with readings in `[low, high]`; NaN means that it was not observed.
 
-    `beyond` says what becomes of a reading outside the range: an error, or the nearest bound. `edges`, sorted values
-    within the range, part its bins where they shall not be of equal width: each edge belongs to the bin above
-    it, and the bins between equal edges stay empty. See `quantile_edges`.
+    `beyond` says what becomes of a reading outside the range: an error, or the nearest bound.
     """
 
     name: str
@@ -68,20 +62,9 @@ class Sensor:
     high: float
     unit: str = ""
     beyond: Literal["error", "clip"] = "error"
-    edges: Sequence[float] | None = None
 
     def __post_init__(self) -> None:
         _check_part(self, "sensor")
-        if self.edges is not None:
-            edges = numbers(self.edges, f"sensor {self.name!r}: edges")
-            if edges.dim() != 1:
-                raise ValueError(f"sensor {self.name!r}: edges must be a sequence; got shape {tuple(edges.shape)}")
-            object.__setattr__(self, "edges", tuple(edges.tolist()))
-            marks = (self.low, *self.edges, self.high)
-            if not all(a <= b for a, b in pairwise(marks)):
-                raise ValueError(
-                    f"sensor {self.name!r}: edges must be sorted and lie within [{self.low:g}, {self.high:g}]"
-                )
         if self.beyond not in ("error", "clip"):
             raise ValueError(f"sensor {self.name!r}: beyond is 'error' or 'clip'; got {self.beyond!r}")
 

@@ -16,16 +16,18 @@ from sklearn.utils import check_random_state
 from sklearn.utils.validation import validate_data
 from torch import Tensor
 
+from behaviours.edges import quantile_edges
 from behaviours.progress import Progress, silent
-from behaviours.schema import Actuator, Schema, Sensor, quantile_edges
-from behaviours.space import Encoder, Space
+from behaviours.schema import Actuator, Schema, Sensor
+from behaviours.space import Space
 from torchvsa import MAP
 from torchvsa._memory_limit import require_memory
+from torchvsa.encoders import Balanced, ThresholdFeatures
 
 _ROWS = 1024
 """Rows encoded at once."""
-_EDGE_BYTES = 40
-"""A bin's edge is kept as a Python float in a tuple: 24 bytes, its place 8, and 8 while it is a tensor's."""
+_EDGE_BYTES = 24
+"""A bin's edge is kept as a float64, twice while all of them are put together and once more while one is found."""
 
 
 class QuantileEncoding(BaseEstimator):
@@ -112,15 +114,17 @@ class QuantileEncoding(BaseEstimator):
         )
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(features)])
-        sensors = []
+        sensors, edges = [], []
         for name, column in zip(names, torch.tensor(readings).T, strict=True):
             seen = column[~column.isnan()]
             low, high = (seen.min().item(), seen.max().item()) if len(seen) else (0.0, 0.0)
             low, high = (low, high) if low < high else _around(low)
-            sensors.append(Sensor(str(name), low, high, beyond="clip", edges=quantile_edges(seen, bins)))  # pyright: ignore[reportArgumentType]
-        encoder = Encoder(bins, combine="thresholds", subset=self._whole("subset"), results="balanced")
+            sensors.append(Sensor(str(name), low, high, beyond="clip"))
+            edges.append((quantile_edges(seen, bins) - low) / (high - low))
         vsa = MAP(self._whole("dim"), dtype=torch.int8)
-        return Space(Schema(sensors, actuators), vsa, encoder, protection="none", seed=seed)
+        encoder = ThresholdFeatures(vsa, features, bins, self._whole("subset"), edges)
+        codes = Balanced(vsa, max(actuator.levels for actuator in actuators))
+        return Space(Schema(sensors, actuators), encoder, seed=seed, command_codes=codes)
 
     def _conditions(
         self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = silent
@@ -132,7 +136,7 @@ class QuantileEncoding(BaseEstimator):
         blocks = torch.tensor(readings).split(_ROWS)
         conditions = []
         for done, block in enumerate(blocks, 1):
-            conditions.append(space.encode(space.bins(block)))
+            conditions.append(space.encode(space.cells(block)))
             progress(done / len(blocks))
         return conditions
 

@@ -46,14 +46,14 @@ _MANY = 128
 """Rows from which on it pays to find equal ones."""
 
 
-def asked_once(answer: Callable[[Int64[Tensor, "some n"]], Recall], bins: Int64[Tensor, "batch n"]) -> Recall:
-    """`answer(bins)`, asking once about rows that are equal: what a robot reads in a while falls into few bins.
+def asked_once(answer: Callable[[Shaped[Tensor, "some w"]], Recall], cells: Shaped[Tensor, "batch w"]) -> Recall:
+    """`answer(cells)`, asking once about rows that are equal: what a robot reads in a while falls into few cells.
 
     A graph and a GPU ask about every row, since how many differ is known only from the values.
     """
-    if torch.compiler.is_compiling() or bins.device.type != "cpu" or len(bins) < _MANY:
-        return answer(bins)
-    distinct, which = distinct_rows(bins)
+    if torch.compiler.is_compiling() or cells.device.type != "cpu" or len(cells) < _MANY:
+        return answer(cells)
+    distinct, which = distinct_rows(cells)
     return answer(distinct).rows(which)
 
 

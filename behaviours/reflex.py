@@ -33,6 +33,6 @@ class Reflex(nn.Module):
 
     def forward(self, readings: Any) -> Recall:
         """Commands, similarity, margin and familiarity; see `Behaviour.forward`."""
-        bins = self.space.bins(readings)
-        recall = self.folded.recall(self.folded.products(self.space.encode(bins)), self.commands)
-        return recall.blank((bins < 0).all(-1))
+        cells = self.space.cells(readings)
+        recall = self.folded.recall(self.folded.products(self.space.encode(cells)), self.commands)
+        return recall.blank((cells < 0).all(-1))

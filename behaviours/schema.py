@@ -1,9 +1,7 @@
 """What a robot senses and does: names, ranges and units."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,7 +12,6 @@ from torch import Tensor
 from behaviours.parts import Actuator, Sensor, most_parts
 from behaviours.tables import column_names, compare_names, numbers
 from torchvsa import ShapeError
-from torchvsa._memory_limit import require_memory
 
 
 @dataclass(frozen=True)
@@ -40,12 +37,6 @@ class Schema:
             if len(set(names)) < len(names):
                 raise ValueError(f"{kind} names must differ; got {', '.join(names)}")
 
-    @cached_property
-    def _most_bins(self) -> float:
-        """The most bins of equal width that every sensor without edges can be parted into."""
-        even = (most_parts(sensor.low, sensor.high) for sensor in self.sensors if sensor.edges is None)
-        return min(even, default=math.inf)
-
     def check_names(self, sensors: Sequence[str] | None = None, actuators: Sequence[str] | None = None) -> None:
         """Raise `ValueError`, naming the columns, unless these are the schema's names in the same order.
 
@@ -65,49 +56,23 @@ class Schema:
         """The inverse of `to_dict`."""
         return cls([Sensor(**s) for s in data["sensors"]], [Actuator(**a) for a in data["actuators"]])
 
-    def sensor_bins(self, readings: Any, bins: int) -> Int64[Tensor, "batch n"]:
-        """The bin of each reading: `bins` of equal width over each sensor's range, -1 for NaN (not observed).
+    def normalise(self, readings: Any) -> Float64[Tensor, "batch n"]:
+        """Readings in units of their sensors' ranges, within [0, 1]; NaN (not observed) stays NaN.
 
-        Bin `b` holds `low + width · b <= reading < low + width · (b + 1)`; `high` itself lies in the last.
-        Sensors with `edges` have their bins between them instead.
-        Raises an error that names sensor, row and range for infinite readings and those out of range.
+        Raises an error that names sensor, row and range for infinite readings and those out of range. In a compiled or
+        exported graph no value can raise: there all readings, infinite ones too, are clipped.
         """
-        if not torch.compiler.is_compiling() and bins > self._most_bins:
-            self._refuse_bins(bins)
         rows, low, high = self._checked(readings)
-        unseen = rows.isnan()
-        index = ((rows - low) * bins / (high - low)).floor().clamp(0, bins - 1)
-        index = torch.where(unseen, -1.0, index).to(torch.int64)
-        if all(sensor.edges is None for sensor in self.sensors):
-            return index
-        columns = zip(self.sensors, rows.unbind(1), index.unbind(1), strict=True)
-        index = torch.stack([self._between_edges(s, bins, row, even) for s, row, even in columns], 1)
-        return torch.where(unseen, -1, index)
+        return (rows - low) / (high - low)
 
-    def _refuse_bins(self, bins: int) -> None:
-        """Raise for the first sensor whose range cannot be parted into so many bins."""
+    def check_bins(self, bins: int) -> None:
+        """Raise `ValueError` for a sensor whose range cannot be parted into so many bins of equal width."""
         for sensor in self.sensors:
-            if sensor.edges is None and bins > most_parts(sensor.low, sensor.high):
+            if bins > most_parts(sensor.low, sensor.high):
                 raise ValueError(
                     f"sensor {sensor.name!r}: {bins} bins of the range [{sensor.low}, {sensor.high}] cannot be told "
                     "apart in float64; take fewer, or a range of another width or nearer to 0"
                 )
-
-    @staticmethod
-    def _between_edges(sensor: Sensor, bins: int, readings: Tensor, even: Tensor) -> Int64[Tensor, "batch"]:
-        """The bins of one sensor's readings between its edges, or those of `even` width where it has none."""
-        if sensor.edges is None:
-            return even
-        if len(sensor.edges) >= bins:
-            raise ValueError(
-                f"sensor {sensor.name!r} has {len(sensor.edges)} edges, which part one bin more than that; "
-                f"the encoder has {bins}"
-            )
-        edges = torch.tensor(sensor.edges, dtype=torch.float64, device=readings.device)
-        if torch.compiler.is_exporting():
-            # The same by comparisons: interchange formats have no bucket search.
-            return (readings[:, None] >= edges).sum(1)
-        return torch.bucketize(readings.contiguous(), edges, right=True)
 
     def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
         """Readings as float64 rows, clipped where a sensor says so; raises if any is not valid.
@@ -166,32 +131,6 @@ class Schema:
     def _bounds(parts: Sequence[Sensor] | Sequence[Actuator], device: torch.device) -> tuple[Tensor, Tensor]:
         ranges = torch.tensor([(part.low, part.high) for part in parts], dtype=torch.float64, device=device)
         return ranges[:, 0], ranges[:, 1]
-
-
-def quantile_edges(readings: Any, bins: int) -> Float64[Tensor, "edges"]:
-    """The edges `[bins - 1]` that part readings `[N]` into `bins` bins of nearly equal counts.
-
-    An edge lies midway between two neighbouring readings; where readings repeat, edges coincide. NaN is left
-    out; without any reading there are no edges. Sees no commands. Raises `ValueError` for infinite readings, and for
-    fewer than one bin.
-    """
-    if bins < 1:
-        raise ValueError(f"readings are parted into at least one bin; got {bins}")
-    values = numbers(readings, "readings").flatten()
-    if values.isinf().any():
-        raise ValueError("readings must be finite, or NaN where there is none")
-    values = values[~values.isnan()].sort().values
-    if len(values) < 2:
-        return values[:0]
-    # Positions, the readings on both sides, and what lies between them.
-    require_memory(6 * 8 * bins, f"the edges of {bins:,} bins", "take fewer bins")
-    above = (torch.arange(1, bins) * len(values)).div(bins, rounding_mode="floor").clamp(min=1)
-    low, high = values[above - 1], values[above]
-    middle = low + (high - low) / 2
-    # Neighbours of opposite signs may be further apart than the largest float.
-    middle = torch.where(middle.isinf(), low / 2 + high / 2, middle)
-    # The mean of two floats side by side may be the lower of them, and would not part them.
-    return torch.where(middle > low, middle, high)
 
 
 def _rows(values: Any, columns: int, what: str, names: list[str]) -> Float64[Tensor, "batch columns"]:

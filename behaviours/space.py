@@ -1,177 +1,199 @@
 """The codebooks that behaviours share, so that their programs can be added."""
 
+import copy
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from operator import index
-from typing import Any, Self, SupportsIndex
+from typing import Any, Self
 
 import torch
-from jaxtyping import Int64, Shaped
+from jaxtyping import Float64, Int64, Shaped
 from torch import Tensor, nn
 
 import torchvsa
 from behaviours.schema import Schema
-from behaviours.storage import check_layout, naming
-from torchvsa import PROTECTIONS, VSA, Protection, Record, Thresholds
-
-
-@dataclass(frozen=True)
-class Encoder:
-    """How readings become conditions: bins, the codes of their values, and how a record joins them.
-
-    `values`, `combine`, `span` and `subset` are those of `torchvsa.Record`, except that `combine="thresholds"` means
-    `torchvsa.Thresholds`, which has no codes of values: bins and `subset` alone. `results` names the codes of the
-    actuators' levels, in `torchvsa.encoding.VALUES`.
-    """
-
-    bins: int = 32
-    values: str = "lookup"
-    combine: str = "bundle"
-    span: int | None = None
-    subset: int | None = None
-    results: str = "lookup"
-
-    def __post_init__(self) -> None:
-        for name in ("bins", "span", "subset"):
-            value = getattr(self, name)
-            if name != "bins" and value is None:
-                continue
-            if isinstance(value, bool) or not isinstance(value, SupportsIndex) or index(value) < 1:
-                raise ValueError(f"{name} is a whole number of at least 1; got {value!r}")
-            object.__setattr__(self, name, index(value))
-        for name in ("values", "combine", "results"):
-            if not isinstance(getattr(self, name), str):
-                raise ValueError(f"{name} is the name of a part; got {getattr(self, name)!r}")
+from behaviours.storage import Layout, check_layout, naming
+from torchvsa import MAP, VSA, Part, Protection, Unprotected
+from torchvsa._checks import whole_number
+from torchvsa.encoders import Encoder, Lookup, Record, Sum, ThresholdFeatures, ValueEncoder
 
 
 class Space(nn.Module):
     """Encode readings as conditions and commands as results, with one set of random codebooks.
 
-    `protection` is a name in `torchvsa.PROTECTIONS`, with options if need be
-    (`{"name": "self_shift", "width": "sum"}`), or a `Protection`. The same seed draws the same codebooks.
-    """
+    Give an `encoder` (which holds its architecture), or a `vsa` on which the default encoder is made, or neither.
+    `command_codes` encodes the levels of the actuators. Parts that are plans, without codebooks of their own, are
+    copied and drawn from `seed`: encoder first, then the codes of commands, then the protection. The same seed draws
+    the same codebooks.
 
-    # A `Record`, or the like of it that `combine` names: indices `[B, n]` in, hypervectors `[B, d]` out.
-    conditions: Any
+    Raises `ValueError` for parts of different architectures or numbers of sensors.
+    """
 
     def __init__(
         self,
         schema: Schema,
-        vsa: VSA,
         encoder: Encoder | None = None,
-        protection: str | dict[str, Any] | Protection = "self_shift",
+        vsa: VSA | None = None,
+        protection: Protection | None = None,
         seed: int = 0,
+        command_codes: ValueEncoder | None = None,
     ) -> None:
         super().__init__()
-        if isinstance(seed, bool) or not isinstance(seed, SupportsIndex) or not 0 <= index(seed) < 2**63:
+        self.schema, self.seed = schema, whole_number(seed, "seed is a whole number")
+        if not 0 <= self.seed < 2**63:
             raise ValueError(f"seed is a whole number in [0, 2^63); got {seed!r}")
-        seed = index(seed)
-        self.schema, self.vsa, self.seed = schema, vsa, seed
-        self.encoder = encoder or Encoder()
-        generator = torch.Generator().manual_seed(seed)
-        options = asdict(self.encoder)
-        bins, results = options.pop("bins"), options.pop("results")
-        if self.encoder.combine == "thresholds":
-            self.conditions = Thresholds(vsa, len(schema.sensors), bins, self.encoder.subset, generator)
-        else:
-            self.conditions = Record(vsa, len(schema.sensors), bins, generator=generator, **options)
-        most = max(actuator.levels for actuator in schema.actuators)
-        self.results = Record(vsa, len(schema.actuators), most, results, generator=generator)
-        if isinstance(protection, Protection):
-            if protection.vsa != vsa:
-                raise ValueError(f"the protection works on {protection.vsa}, this space on {vsa}")
-            self.protect = protection
-        else:
-            kind, options = _protection(protection)
-            if "h" in kind.layout(vsa):
-                options["h"] = vsa.random(generator=generator)
-            self.protect = kind(vsa, **options)
+        _check_kinds(encoder, vsa, protection, command_codes)
+        sensors, actuators = len(schema.sensors), schema.actuators
+        if encoder is None:
+            vsa = vsa or MAP(dim=4000, dtype=torch.int8)
+            encoder = ThresholdFeatures(vsa, sensors)
+        elif vsa is not None and vsa != encoder.vsa:
+            raise ValueError(f"the encoder works on {encoder.vsa}, which is not the given {vsa}; give one of them")
+        if encoder.sensors != sensors:
+            raise ValueError(f"the encoder is for {encoder.sensors} sensors; the schema has {sensors}")
+        if isinstance(encoder, Record) and encoder.discrete:
+            schema.check_bins(encoder.bins)
+        self.vsa = encoder.vsa
+        most = max(actuator.levels for actuator in actuators)
+        results = Sum(command_codes or Lookup(self.vsa, most), sensors=len(actuators))
+        if results.bins != most:
+            raise ValueError(f"the codes of commands are for {results.bins} levels; the schema has {most}")
+        protection = protection or Unprotected(self.vsa)
+        generator = torch.Generator().manual_seed(self.seed)
+        self.encoder = _drawn(encoder, self.vsa, generator)
+        self.results = _drawn(results, self.vsa, generator)
+        self.protect = _drawn(protection, self.vsa, generator)
 
-    def bins(self, readings: Any) -> Int64[Tensor, "batch n"]:
-        """The bin of each reading, -1 where it was not observed; raises for invalid readings."""
-        return self.schema.sensor_bins(readings, self.encoder.bins).to(self.results.table.device)
+    # -- readings ---------------------------------------------------------------------------------------
 
-    def encode(self, bins: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """The protected condition of each row of bins (Algorithm 1, line 3, and the protection of line 6)."""
-        return self.protect(self.conditions(bins))
+    def cells(self, readings: Any, episodes: Int64[Tensor, "N"] | None = None) -> Shaped[Tensor, "batch w"]:
+        """What of each row of readings `[B, n]` matters to the encoder, see `Encoder.cells`; raises for invalid ones.
+
+        An encoder with a memory needs `episodes`, which say what run each row comes from: see `History.windows`.
+        """
+        x = self.schema.normalise(readings).to(self.device)
+        if self.encoder.width != self.encoder.sensors:
+            if episodes is None:
+                raise ValueError(
+                    "these behaviours remember past readings: give the episodes of recorded rows, or use start() and "
+                    "step() for live ones"
+                )
+            x = self.encoder.windows(x, episodes.to(self.device))
+        return self.encoder.cells(x)
+
+    def encode(self, cells: Shaped[Tensor, "batch w"]) -> Shaped[Tensor, "batch d"]:
+        """The protected condition of each row of cells (Algorithm 1, line 3, and the protection of line 6)."""
+        return self.protect(self.encoder.encode(cells))
+
+    def start(self, batch: int) -> Float64[Tensor, "batch past n"]:
+        """What is remembered of past readings before the first step."""
+        return self.encoder.start(batch).to(self.device)
+
+    def step(
+        self, readings: Any, past: Float64[Tensor, "batch past n"]
+    ) -> tuple[Shaped[Tensor, "batch w"], Float64[Tensor, "batch past n"]]:
+        """The cells of live readings `[B, n]` after `past`, and the past of the next step."""
+        x, past = self.encoder.step(self.schema.normalise(readings).to(self.device), past)
+        return self.encoder.cells(x), past
+
+    # -- results ----------------------------------------------------------------------------------------
+
+    def items(self, levels: Int64[Tensor, "k m"]) -> Shaped[Tensor, "k d"]:
+        """The hypervector of each result, a row of one level per actuator."""
+        return self.results.encode(levels)
+
+    @property
+    def device(self) -> torch.device:
+        """Where the codebooks are."""
+        return self.results.roles.device
+
+    # -- the space as a value ---------------------------------------------------------------------------
 
     def config(self) -> dict[str, Any]:
         """What `Space.from_config` needs, beside the tensors, to make an equal space."""
         return {
-            "kind": "space",
             "schema": self.schema.to_dict(),
             "vsa": self.vsa.config(),
-            "encoder": asdict(self.encoder),
+            "encoder": self.encoder.config(),
+            "command_codes": self.results.value.config(),
             "protection": self.protect.config(),
             "seed": self.seed,
         }
-
-    def codebooks(self) -> dict[str, Tensor]:
-        """The tensors that, with `config`, make an equal space."""
-        return self.state_dict()
 
     def same_as(self, other: "Space") -> bool:
         """Whether both encode everything alike: equal configurations and equal codebooks, wherever they are."""
         if self is other:
             return True
-        mine, theirs = self.codebooks(), other.codebooks()
+        mine, theirs = self.state_dict(), other.state_dict()
         return (
             self.config() == other.config()
             and mine.keys() == theirs.keys()
             and all(torch.equal(tensor.cpu(), theirs[name].cpu()) for name, tensor in mine.items())
         )
 
-    @classmethod
-    def layout(cls, config: dict[str, Any]) -> dict[str, tuple[torch.dtype, tuple]]:
+    @staticmethod
+    def layout(config: Mapping[str, Any]) -> Layout:
         """The types and shapes of the codebooks of a space with this configuration, found without making it."""
-        schema, vsa, encoder = _parts(config)
-        sensors, actuators = len(schema.sensors), len(schema.actuators)
-        if encoder.combine == "thresholds":
-            conditions = Thresholds.layout(vsa, sensors, encoder.subset)
-        else:
-            conditions = Record.layout(vsa, sensors, encoder.bins, encoder.combine)
-        results = Record.layout(vsa, actuators, max(actuator.levels for actuator in schema.actuators))
-        parts = {
-            "conditions": conditions,
-            "results": results,
-            "protect": _protection(config["protection"])[0].layout(vsa),
-        }
-        return {f"{part}.{name}": wanted for part, layout in parts.items() for name, wanted in layout.items()}
+        _, _, parts = _plans(config)
+        return _layout(parts)
 
     @classmethod
-    def from_config(cls, config: dict[str, Any], codebooks: Mapping[str, Tensor] | None = None) -> Self:
+    def from_config(cls, config: Mapping[str, Any], codebooks: Mapping[str, Tensor] | None = None) -> Self:
         """The inverse of `config`; parts are looked up by name, nothing in it is run.
 
         Without `codebooks` they are drawn from the seed. Raises `ValueError` naming what does not fit; codebooks are
         compared with the configuration before anything is made.
         """
+        schema, vsa, parts = _plans(config)
         if codebooks is not None:
-            check_layout(codebooks, cls.layout(config))
-        schema, vsa, encoder = _parts(config)
-        with naming("space"):
-            space = cls(schema, vsa, encoder, config["protection"], config["seed"])
-        if codebooks is not None:
-            space.load_state_dict(dict(codebooks))
-            for name in ("conditions", "results", "protect"):
+            check_layout(codebooks, _layout(parts))
+            for name, part in parts.items():
+                start = f"{name}."
                 with naming(name):
-                    getattr(space, name).check()
+                    part.take({key.removeprefix(start): t for key, t in codebooks.items() if key.startswith(start)})
+        results: Any = parts["results"]
+        space = cls(schema, parts["encoder"], vsa, parts["protect"], config["seed"], results.value)  # type: ignore[arg-type]
+        space.results = results if results.drawn else space.results
         return space
 
 
-def _parts(config: dict[str, Any]) -> tuple[Schema, VSA, Encoder]:
-    """What of a configuration takes no memory."""
+def _layout(parts: Mapping[str, Part]) -> Layout:
+    return {f"{name}.{key}": wanted for name, part in parts.items() for key, wanted in part.layout().items()}
+
+
+def _plans(config: Mapping[str, Any]) -> tuple[Schema, VSA, dict[str, Part]]:
+    """The parts that a configuration describes, without codebooks: they take no memory."""
     with naming("schema"):
         schema = Schema.from_dict(config["schema"])
     with naming("vsa"):
         vsa = torchvsa.architecture(**config["vsa"])
+    parts: dict[str, Part] = {}
     with naming("encoder"):
-        return schema, vsa, Encoder(**config["encoder"])
+        parts["encoder"] = torchvsa.encoders.encoder(config["encoder"], vsa)
+    with naming("command_codes"):
+        values = torchvsa.encoders.value_encoder(config["command_codes"], vsa)
+        parts["results"] = Sum(values, sensors=len(schema.actuators))
+    with naming("protection"):
+        parts["protect"] = torchvsa.protection(config["protection"], vsa)
+    return schema, vsa, parts
 
 
-def _protection(given: str | dict[str, Any]) -> tuple[type[Protection], dict[str, Any]]:
-    """The class of a protection, by its name, and its options."""
-    options: dict[str, Any] = {"name": given} if isinstance(given, str) else dict(given)
-    name = options.pop("name", None)
-    if name not in PROTECTIONS:
-        raise ValueError(f"there is no protection {name!r}; choose one of {', '.join(PROTECTIONS)}")
-    return PROTECTIONS[name], options
+def _drawn(part: Any, vsa: VSA, generator: torch.Generator) -> Any:
+    """The part itself, or if it is a plan, a copy with codebooks."""
+    if part.vsa != vsa:
+        raise ValueError(f"{type(part).__name__} works on {part.vsa}, this space on {vsa}")
+    return part if part.drawn else copy.deepcopy(part).draw(generator)
+
+
+def _check_kinds(encoder: object, vsa: object, protection: object, command_codes: object) -> None:
+    kinds = {"encoder": Encoder, "vsa": VSA, "protection": Protection, "command_codes": ValueEncoder}
+    given = {"encoder": encoder, "vsa": vsa, "protection": protection, "command_codes": command_codes}
+    for name, value in given.items():
+        if value is not None and not isinstance(value, kinds[name]):
+            raise ValueError(f"{name} is an object such as {_EXAMPLES[name]}, not a name or a class; got {value!r:.80}")
+
+
+_EXAMPLES = {
+    "encoder": "torchvsa.encoders.Product(Level(vsa, bins=32), sensors=3)",
+    "vsa": "torchvsa.MAP(dim=4000)",
+    "protection": "torchvsa.SelfShift(vsa)",
+    "command_codes": "torchvsa.encoders.Lookup(vsa, bins=3)",
+}

@@ -6,9 +6,10 @@ import torch
 from torch import Tensor
 
 import sim
-from behaviours import Demonstrations, Encoder, Space
+from behaviours import Demonstrations, Space
 from experiments import presets
-from torchvsa import MAP
+from torchvsa import MAP, SelfShift
+from torchvsa.encoders import Lookup, Sum
 
 
 @cache
@@ -24,7 +25,8 @@ def samples(count: int) -> Demonstrations:
 def space(dim: int, device: str) -> Space:
     """The paper's: 32 lookup codes, bundled, behind the self-derived shift with the mean width."""
     vsa = MAP(dim, dtype=torch.int8)
-    return Space(presets.schema(), vsa, Encoder(32), {"name": "self_shift", "width": "mean"}).to(device)
+    schema = presets.schema()
+    return Space(schema, Sum(Lookup(vsa, 32), len(schema.sensors)), protection=SelfShift(vsa)).to(device)
 
 
 def different(space: Space, rows: int, generator: torch.Generator) -> Tensor:

@@ -10,7 +10,8 @@ from torch import Tensor
 from benchmarks import floors
 from benchmarks.harness import INPUTS, Case, variants
 from benchmarks.peers import hypervectors, plain
-from torchvsa import MAP, Record
+from torchvsa import MAP
+from torchvsa.encoders import Level, Sum
 
 
 def cases(device: str, small: bool = False) -> Iterator[Case]:
@@ -19,13 +20,13 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     for sensors in (3, 24):
         generator = torch.Generator().manual_seed(sensors)
         vsa = MAP(dim, dtype=torch.int8)
-        encode = Record(vsa, sensors, levels, values="level", generator=generator).to(device)
+        record = Sum(Level(vsa, levels), sensors).draw(generator).to(device)
         rows = [torch.randint(levels, (batch, sensors), generator=generator).to(device) for _ in range(INPUTS)]
-        peer = Peer(encode)
+        peer = Peer(record)
         # 3 sensors are bound by writing the result, 24 by reading the entries of the table.
-        result = encode(rows[0])
+        result = record.encode(rows[0])
         floor = floors.fill(result) if sensors == 3 else floors.read(sensors * result.numel(), device)
-        for suffix, call in variants(encode, compiled=True).items():
+        for suffix, call in variants(record.encode, compiled=True).items():
 
             def check(call=call, rows=rows, peer=peer) -> None:
                 for theirs in (peer.default, peer.tuned):
@@ -49,7 +50,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
 class Peer:
     """The same record in the peer's operations, without the clip."""
 
-    def __init__(self, record: Record) -> None:
+    def __init__(self, record: Sum) -> None:
         self.keys = hypervectors(record.roles)
         self.codes = hypervectors(record.codes)
         # A user can bind the table of all values once, by hand.

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import torch
 
-from behaviours import Actuator, Demonstrations, Encoder, ErrorDriven, OneShot, Schema, Sensor, Space
+from behaviours import Actuator, Demonstrations, ErrorDriven, OneShot, Schema, Sensor, Space
 from benchmarks.harness import wait
-from torchvsa import MAP, CleanUp, Record, SelfShift
+from torchvsa import MAP, CleanUp, SelfShift
+from torchvsa.encoders import Level, Lookup, Sum
 
 Work = Callable[[], object]
 
@@ -18,16 +19,16 @@ Work = Callable[[], object]
 def encode(batch: int = 512, sensors: int = 3, dim: int = 4000, device: str = "cpu") -> Work:
     """Records of `sensors` values."""
     generator = torch.Generator().manual_seed(0)
-    record = Record(MAP(dim, dtype=torch.int8), sensors, 64, values="level", generator=generator).to(device)
+    record = Sum(Level(MAP(dim, dtype=torch.int8), 64), sensors).draw(generator).to(device)
     rows = torch.randint(64, (batch, sensors), generator=generator).to(device)
-    return lambda: record(rows)
+    return lambda: record.encode(rows)
 
 
 def protect(batch: int = 512, dim: int = 4000, device: str = "cpu") -> Work:
     """Shifts by widths of their own."""
     vsa = MAP(dim, dtype=torch.int8)
     rows = vsa.random(batch, generator=torch.Generator().manual_seed(0)).to(device)
-    shift = SelfShift(vsa).to(device)
+    shift = SelfShift(vsa, seed=0).to(device)
     return lambda: shift(rows)
 
 
@@ -43,7 +44,8 @@ def _robot(sensors: int, dim: int, device: str) -> Space:
     schema = Schema(
         [Sensor(f"s{i}", 0, 20) for i in range(sensors)], [Actuator(f"a{i}", -1, 1, levels=3) for i in range(2)]
     )
-    return Space(schema, MAP(dim, dtype=torch.int8), Encoder(20), {"name": "self_shift", "width": "sum"}).to(device)
+    vsa = MAP(dim, dtype=torch.int8)
+    return Space(schema, Sum(Lookup(vsa, 20), sensors), protection=SelfShift(vsa, "sum")).to(device)
 
 
 def _pairs(count: int, sensors: int) -> Demonstrations:

@@ -15,7 +15,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     """With the raw accumulator, and with the literal clip."""
     dim, count = (256, 300) if small else (4000, 20_000)
     shown, space = corral.samples(count), corral.space(dim, device)
-    bins, levels = space.bins(shown.sensors), space.schema.command_levels(shown.commands).to(device)
+    bins, levels = space.cells(shown.sensors), space.schema.command_levels(shown.commands).to(device)
     for clip in (False, True):
         rule, literal = OneShot(known="similarity", clip_each_step=clip), Literal(space, clip)
         threshold = rule.sigmas / dim**0.5

@@ -1,6 +1,6 @@
 """The paper's two algorithms in torchhd's operations: one sample, one step after the other."""
 
-from typing import Any
+from typing import Any, cast
 
 import torch
 import torchhd
@@ -9,6 +9,7 @@ from torch import Tensor
 from behaviours import Space
 from benchmarks.peers import hypervectors, plain
 from torchvsa import SelfShift
+from torchvsa.encoders import Record
 
 
 class Literal:
@@ -16,7 +17,7 @@ class Literal:
 
     def __init__(self, space: Space, clip: bool) -> None:
         assert isinstance(space.protect, SelfShift)
-        record, results = space.conditions, space.results
+        record, results = cast(Record, space.encoder), cast(Record, space.results)
         tables = (record.roles, record.codes, results.roles, results.codes, space.protect.h)
         self.sensors, self.values, self.actuators, self.commands, self.h = map(hypervectors, tables)
         self.index = torch.arange(len(self.h), device=self.h.device)

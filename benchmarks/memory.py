@@ -8,8 +8,9 @@ import torch
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from behaviours import Actuator, Demonstrations, Encoder, OneShot, Schema, Sensor, Space
+from behaviours import Actuator, Demonstrations, OneShot, Schema, Sensor, Space
 from torchvsa import MAP
+from torchvsa.encoders import Lookup, Sum
 
 
 def main() -> None:
@@ -21,7 +22,7 @@ def main() -> None:
     options = parser.parse_args()
     generator = torch.Generator().manual_seed(0)
     schema = Schema([Sensor(f"s{i}", 0, 1) for i in range(options.sensors)], [Actuator("motor", -1, 1, levels=3)])
-    space = Space(schema, MAP(options.dim, dtype=torch.int8), Encoder(32), "none")
+    space = Space(schema, Sum(Lookup(MAP(options.dim, dtype=torch.int8), 32), options.sensors))
     readings = torch.rand(options.samples, options.sensors, generator=generator)
     shown = Demonstrations(readings, torch.sign(readings[:, :1] - readings[:, 1:2]))
     columns = (TextColumn("learning"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())

@@ -22,7 +22,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     shown, space = corral.samples(count), corral.space(dim, device)
     rule, literal = OneShot(known="similarity"), Literal(space, clip=False)
     behaviour = rule.fit(space, shown)
-    literal.learn(space.bins(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
+    literal.learn(space.cells(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)
     options: Any = {"guard_filter_fn": torch.compiler.skip_guard_on_all_nn_modules_unsafe}
     compiled: Any = torch.compile(Reflex(behaviour), fullgraph=True, dynamic=False, options=options)
@@ -38,7 +38,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
             else shown.sensors[torch.randint(count, (rows,), generator=generator)]
             for _ in range(INPUTS)
         ]
-        bins = [space.bins(some) for some in readings]
+        bins = [space.cells(some) for some in readings]
         # The peer answers rows of bins, one without a batch dimension.
         asked = [some[0] if rows == 1 else some for some in bins]
 

@@ -79,7 +79,7 @@ def measure(
     Distinct conditions are counted at the bins of `reference` for all, so that the figures compare.
     """
     space = controller.space or reference
-    conditions = torch.cat([space.bins(train.sensors), space.bins(heldout.sensors)])
+    conditions = torch.cat([space.cells(train.sensors), space.cells(heldout.sensors)])
     own = distinct_rows(conditions)[1].numpy()
     train_own, heldout_own = own[: len(train)], own[len(train) :]
     train_right = right(controller.policy, train)
@@ -89,7 +89,7 @@ def measure(
     if controller.space is not None:
         agreed = _consistent(train_own, train)[train_own]
     unseen = ~np.isin(heldout_own, train_own)
-    distinct = distinct_rows(reference.bins(heldout.sensors))[1].numpy()
+    distinct = distinct_rows(reference.cells(heldout.sensors))[1].numpy()
     per_condition = np.bincount(distinct, weights=heldout_right) / np.bincount(distinct)
     fires = sim.Teacher().rule(heldout.sensors.numpy())
     return Agreement(

@@ -101,11 +101,11 @@ def command_map(mind: Behaviour | Policy, plane: Slice, heldout: Demonstrations)
     readings[..., plane.y] = cells[plane.y][:, None]
     probe = torch.zeros(1, 3, dtype=torch.float64)
     probe[0, plane.third] = plane.fixed
-    readings[..., plane.third] = cells[plane.third, int(space.bins(probe)[0, plane.third])]
+    readings[..., plane.third] = cells[plane.third, int(space.cells(probe)[0, plane.third])]
     rows = readings.reshape(-1, 3)
     recalled = _in_blocks(lambda block: mind(block).commands.numpy(), rows)
     same = _told(heldout.sensors.numpy(), plane.third) == _told(rows[:1], plane.third)
-    where = space.bins(heldout.sensors).numpy()[same]
+    where = space.cells(heldout.sensors).numpy()[same]
     met = np.zeros((bins, bins), dtype=np.int64)
     np.add.at(met, (where[:, plane.y], where[:, plane.x]), 1)
     square = (bins, bins)

@@ -42,7 +42,7 @@ class DamagedProgram:
 
     def __call__(self, sensors: Floats, *_: NDArray[np.int64]) -> Floats:
         """Commands `[B, 2]` for readings `[B, 3]`."""
-        rows = [tuple(row) for row in self.space.bins(sensors).tolist()]
+        rows = [tuple(row) for row in self.space.cells(sensors).tolist()]
         new = [row for row in dict.fromkeys(rows) if row not in self._known]
         if new:
             self._known |= dict(zip(new, self.results(torch.tensor(new)).tolist(), strict=True))
@@ -87,13 +87,13 @@ class Programmed(Learner):
             return DamagedProgram(self.space, torch.from_numpy(values), self.items, commands)
         table, items = damage([Array(codes.double().numpy().ravel()) for codes in (self._values(), self.items)])
         space = _in_floats(self._float_space)
-        space.conditions.table[:, :-1] = torch.from_numpy(table).view(self._values().shape)
+        space.encoder.table[:, :-1] = torch.from_numpy(table).view(self._values().shape)
         return DamagedProgram(space, program, torch.from_numpy(items).view(self.items.shape), commands)
 
     def commands(self, part: str, damage: Damage, sensors: Floats) -> Floats:
         """See `Learner.commands`; each distinct condition is asked, and as far as possible encoded, once."""
         if self._asked is None or self._asked[0] is not sensors:
-            bins, which = distinct_rows(self.space.bins(sensors))
+            bins, which = distinct_rows(self.space.cells(sensors))
             self._asked = sensors, bins, which, self.space.encode(bins)
         _, bins, which, conditions = self._asked
         mind = self.damaged(part, damage)
@@ -101,7 +101,7 @@ class Programmed(Learner):
 
     def _values(self) -> Tensor:
         # Without the last entry of each sensor, which stands for a reading that is missing.
-        return self.space.conditions.table[:, :-1]
+        return self.space.encoder.table[:, :-1]
 
 
 def _in_floats(space: Space) -> Space:

@@ -86,7 +86,7 @@ def on_the_edge(mind: Behaviour | Policy, train: Demonstrations, heldout: Demons
     together: its threshold runs through their bin. None if there are no differences.
     """
     both = Demonstrations.join([train, heldout])
-    bins = mind.space.bins(both.sensors).numpy()
+    bins = mind.space.cells(both.sensors).numpy()
     # One number per condition sorts far faster than rows.
     keys = np.ravel_multi_index(tuple((bins + 1).T), (mind.space.encoder.bins + 1,) * bins.shape[1])
     _, first, condition = np.unique(keys, return_index=True, return_inverse=True)

@@ -83,7 +83,7 @@ def learners(config: Mapping[str, Any], bins: int) -> dict[str, tuple[Space, Rul
 def recalled(rules: Mapping[str, tuple[Space, Rule]], shown: Demonstrations) -> Recalled:
     """Learn the demonstrations with each rule, then ask for every condition that was shown with one command."""
     first = next(iter(rules.values()))[0]
-    conditions, which = distinct_rows(first.bins(shown.sensors))
+    conditions, which = distinct_rows(first.cells(shown.sensors))
     results, result = distinct_rows(first.schema.command_levels(shown.commands))
     pairs = torch.stack([which, result], 1).unique(dim=0)
     single = torch.bincount(pairs[:, 0], minlength=len(conditions)) == 1

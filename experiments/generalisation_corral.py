@@ -211,7 +211,7 @@ def _agreement(policy: sim.Policy, space: Space, lesson: Lesson, examined: Lesso
     The conditions of all learners, rivals included, are told apart at the same bins.
     """
     correct = right(policy, examined.demonstrations, examined.steps)
-    bins = torch.cat([space.bins(lesson.sensors), space.bins(examined.sensors)])
+    bins = torch.cat([space.cells(lesson.sensors), space.cells(examined.sensors)])
     own = distinct_rows(bins)[1].numpy()
     met = np.unique(own[: len(lesson.sensors)])
     unseen = ~np.isin(own[len(lesson.sensors) :], met)

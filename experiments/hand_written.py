@@ -7,11 +7,12 @@ paper cites as [10].
 import torch
 
 import sim
-from behaviours import Behaviour, Encoder, LearningReport, Schema, Sensor, Space
+from behaviours import Behaviour, LearningReport, Schema, Sensor, Space
 from experiments.presets import schema as learners_schema
 from sim.sensors import LIGHT_MAX
 from sim.teacher import COMMANDS, OBSTACLE
 from torchvsa import VSA
+from torchvsa.encoders import Lookup, Sum
 
 YES, NO, EITHER = 0, 1, -1
 """Whether a reading is below its threshold (bin 0 of 2), is not, or does not matter (left out of the condition)."""
@@ -40,7 +41,7 @@ def space(vsa: VSA, seed: int) -> Space:
         for (name, _, _, unit), threshold in zip(sim.SENSORS, thresholds, strict=True)
     ]
     schema = Schema(sensors, learners_schema().actuators)
-    return Space(schema, vsa, Encoder(bins=2, values="lookup", combine="bundle"), "none", seed)
+    return Space(schema, Sum(Lookup(vsa, bins=2), len(sensors)), seed=seed)
 
 
 def behaviour(vsa: VSA, seed: int) -> Behaviour:
@@ -49,7 +50,7 @@ def behaviour(vsa: VSA, seed: int) -> Behaviour:
     conditions = codes.encode(torch.tensor([condition for condition, _ in RULES]))
     commands = codes.schema.command_levels(COMMANDS)
     weights = torch.tensor([weight for _, weight in RULES])
-    program = vsa.superpose(vsa.bind(conditions, codes.results(commands)), weights=weights)
+    program = vsa.superpose(vsa.bind(conditions, codes.items(commands)), weights=weights)
     results = commands[:3]  # avoid and cruise repeat the commands of the first two rules
     report = LearningReport("hand_written", samples=len(RULES), new=len(RULES))
     return Behaviour(codes, program, vsa.superpose(conditions), results, report)

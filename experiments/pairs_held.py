@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import torchvsa
-from behaviours import Actuator, Behaviour, Demonstrations, Encoder, Rule, Schema, Sensor, Space
+from behaviours import Actuator, Behaviour, Demonstrations, Rule, Schema, Sensor, Space
 from experiments import presets
 from torchvsa import recall_probability
 
@@ -48,7 +48,9 @@ def space(vsa: Mapping[str, Any], codes: Mapping[str, Any], dim: int, seed: int)
     """Codebooks of `dim` dimensions, for one entry of the setting `codes`."""
     options = dict(codes)
     protection = dict(options.pop("protection"))
-    return Space(SCHEMA, torchvsa.architecture(**vsa, dim=dim), Encoder(VALUES, **options), protection, seed)
+    return presets.space_of(
+        SCHEMA, torchvsa.architecture(**vsa, dim=dim), {"bins": VALUES, **options}, protection, seed
+    )
 
 
 def parts(config: Mapping[str, Any], learner: str, dim: int, seed: int) -> tuple[Rule, Space]:

@@ -6,7 +6,9 @@ from typing import Any, Literal
 
 import sim
 import torchvsa
-from behaviours import POLICIES, RULES, Actuator, BehaviourBank, Encoder, Policy, Rule, Schema, Sensor, Space
+from behaviours import POLICIES, RULES, Actuator, BehaviourBank, Policy, Rule, Schema, Sensor, Space
+from torchvsa import VSA
+from torchvsa.encoders import Encoder, Product, SubsetProduct, Sum, ThresholdFeatures, value_encoder
 
 COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
@@ -22,8 +24,49 @@ def schema(beyond: Literal["error", "clip"] = "clip") -> Schema:
 
 def space(vsa: Mapping[str, Any], parts: Mapping[str, Any], seed: int, bins: int | None = None) -> Space:
     """Codebooks for the groups `encoder`, `record` and `protection` in `parts`, with other `bins` if given."""
-    options: dict[str, Any] = {**parts["encoder"], **parts["record"]} | ({} if bins is None else {"bins": bins})
-    return Space(schema(), torchvsa.architecture(**vsa), Encoder(**options), dict(parts["protection"]), seed)
+    options = {**parts["encoder"], **parts["record"]} | ({} if bins is None else {"bins": bins})
+    return space_of(schema(), torchvsa.architecture(**vsa), options, parts["protection"], seed)
+
+
+def space_of(schema: Schema, vsa: VSA, options: Mapping[str, Any], protection: Mapping[str, Any], seed: int) -> Space:
+    """Codebooks with the encoder that `options` name (see `encoder`), and the codes of commands (`results`)."""
+    given = dict(options)
+    codes = {"name": given.pop("results", "lookup"), "bins": max(actuator.levels for actuator in schema.actuators)}
+    return Space(
+        schema,
+        encoder(vsa, len(schema.sensors), **given),
+        protection=torchvsa.protection(protection, vsa),
+        seed=seed,
+        command_codes=value_encoder(codes, vsa),
+    )
+
+
+def encoder(
+    vsa: VSA,
+    sensors: int,
+    bins: int = 32,
+    values: str = "lookup",
+    combine: str = "bundle",
+    span: int | None = None,
+    subset: int | None = None,
+) -> Encoder:
+    """The encoder of the groups `encoder` and `record`, as a plan.
+
+    Raises `ValueError` for names that do not exist, and for options that their parts do not take.
+    """
+    if span is not None and values != "level":
+        raise ValueError(f"{values!r} takes no span; got span={span}")
+    if subset is not None and combine not in ("subset", "thresholds"):
+        raise ValueError(f"{combine!r} takes no subset; got subset={subset}")
+    if combine == "thresholds":
+        return ThresholdFeatures(vsa, sensors, bins, subset)
+    value = value_encoder({"name": values, "bins": bins} | ({} if span is None else {"span": span}), vsa)
+    if combine == "subset":
+        return SubsetProduct(value, sensors, subset)
+    records = {"bundle": Sum, "bind": Product}
+    if combine not in records:
+        raise ValueError(f"there is no record {combine!r}; choose one of {', '.join(records)}, subset, thresholds")
+    return records[combine](value, sensors)
 
 
 def rule(options: Mapping[str, Any]) -> Rule:

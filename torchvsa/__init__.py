@@ -1,11 +1,12 @@
 """Vector Symbolic Architectures in PyTorch: batched, exact where integers allow, and plain tensors throughout."""
 
+from torchvsa import encoders
 from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
 from torchvsa.capacity import dim_needed, pairs_held, recall_probability
-from torchvsa.encoding import Record, Thresholds, balanced, level, lookup
 from torchvsa.errors import ShapeError
 from torchvsa.memory import CleanUp, Match
-from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected
+from torchvsa.part import Part
+from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected, protection
 
 __version__ = "0.1.0"
 
@@ -20,17 +21,15 @@ __all__ = [
     "CleanUp",
     "FixedShift",
     "Match",
+    "Part",
     "Protection",
-    "Record",
     "SelfShift",
     "ShapeError",
-    "Thresholds",
     "Unprotected",
     "architecture",
-    "balanced",
     "dim_needed",
-    "level",
-    "lookup",
+    "encoders",
     "pairs_held",
+    "protection",
     "recall_probability",
 ]

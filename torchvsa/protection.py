@@ -4,11 +4,13 @@ The paper protects every condition, so that conditions which share sensor values
 protection has two verbs: `protect(x)` and `protect.invert(y)`.
 """
 
-from typing import ClassVar, Literal
+from abc import abstractmethod
+from collections.abc import Mapping
+from typing import Any, Literal
 
 import torch
 from jaxtyping import Int, Shaped
-from torch import Tensor, nn
+from torch import Tensor
 
 from torchvsa._checks import whole_number
 from torchvsa._memory_limit import require_memory
@@ -16,42 +18,42 @@ from torchvsa.architectures import VSA
 from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
 from torchvsa.exact import dots, is_integer, signed
+from torchvsa.part import Layout, Part
+from torchvsa.registry import Registry
 
 
-class Protection(nn.Module):
+class Protection(Part):
     """A map of hypervectors to hypervectors `[..., d] -> [..., d]`, with an inverse (exact or estimated)."""
 
-    name: ClassVar[str]
-
-    def __init__(self, vsa: VSA) -> None:
-        super().__init__()
-        self.vsa = vsa
-
+    @abstractmethod
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Protect `x`."""
-        raise NotImplementedError
 
+    @abstractmethod
     def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Recover `x` from `y = protect(x)`."""
-        raise NotImplementedError
 
-    def config(self) -> dict[str, str | int]:
-        """The name in `PROTECTIONS` and the options from which it is made again."""
-        return {"name": self.name}
-
-    @staticmethod
-    def layout(vsa: VSA) -> dict[str, tuple[torch.dtype, tuple]]:
-        """The types and shapes of its tensors, found without making it."""
+    def own_layout(self) -> Layout:
+        """Nothing of its own."""
         return {}
 
-    def check(self) -> None:
-        """Raise `ValueError` naming the tensor if one does not hold codes of the architecture."""
+    def _draw(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
+        return {}
+
+    def config(self) -> dict[str, Any]:
+        """See `Part.config`."""
+        return {"name": self.name}
 
 
 class Unprotected(Protection):
     """No protection: similar conditions stay similar, so that a program can generalise between them."""
 
     name = "none"
+
+    def __init__(self, vsa: VSA) -> None:
+        super().__init__()
+        self.vsa = vsa
+        self._own(None)
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """`x` itself."""
@@ -68,8 +70,10 @@ class FixedShift(Protection):
     name = "fixed_shift"
 
     def __init__(self, vsa: VSA, shift: int = 1) -> None:
-        super().__init__(vsa)
+        super().__init__()
+        self.vsa = vsa
         self.shift = whole_number(shift, "the shift of a fixed shift is a whole number")
+        self._own(None)
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Shift to the right."""
@@ -79,8 +83,8 @@ class FixedShift(Protection):
         """Shift back."""
         return self.vsa.permute(y, -self.shift)
 
-    def config(self) -> dict[str, str | int]:
-        """See `Protection.config`."""
+    def config(self) -> dict[str, Any]:
+        """See `Part.config`."""
         return {"name": self.name, "shift": self.shift}
 
 
@@ -113,10 +117,11 @@ class SelfShift(Protection):
         self,
         vsa: VSA,
         width: Literal["mean", "sum"] = "mean",
-        seed: int = 0,
+        seed: int | None = None,
         h: Shaped[Tensor, "d"] | None = None,
     ) -> None:
-        super().__init__(vsa)
+        super().__init__()
+        self.vsa = vsa
         if width not in ("mean", "sum"):
             raise ValueError(f"the width of a self-derived shift is 'mean' or 'sum'; got {width!r}")
         self.width_rule = width
@@ -127,9 +132,9 @@ class SelfShift(Protection):
             raise ShapeError(f"h must be one hypervector of d = {vsa.dim} elements; got shape {tuple(h.shape)}")
         if h is not None and h.dtype != vsa.dtype:
             raise ValueError(f"h must be a hypervector of {vsa}; got {h.dtype}")
-        if h is None:
-            h = vsa.random(generator=torch.Generator().manual_seed(seed))
-        self.register_buffer("h", h)
+        self._own(seed if h is None else None)
+        if h is not None:
+            self.h = h
         # Indices in base 128, so that their sums are exact products of int8 on any device.
         places = 128 ** torch.arange(count)
         digits = torch.arange(vsa.dim) // places[:, None] % 128
@@ -137,14 +142,12 @@ class SelfShift(Protection):
         self.register_buffer("columns", columns.to(torch.int8), persistent=False)
         self.register_buffer("places", places, persistent=False)
 
-    @staticmethod
-    def layout(vsa: VSA) -> dict[str, tuple[torch.dtype, tuple]]:
-        """See `Protection.layout`."""
-        return {"h": (vsa.dtype, (vsa.dim,))}
+    def own_layout(self) -> Layout:
+        """`h` `[d]`."""
+        return {"h": (self.vsa.dtype, (self.vsa.dim,))}
 
-    def check(self) -> None:
-        """See `Protection.check`."""
-        self.vsa.check_codes(self.h, "h")
+    def _draw(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
+        return {"h": self.vsa.random(generator=generator)}
 
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""
@@ -167,6 +170,7 @@ class SelfShift(Protection):
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Superpose `x` with `h`, then shift by the width of `x`."""
         self.vsa.check(x, "x")
+        self._require_drawn()
         return self.vsa.bundle_two_and_permute(x, self.h.to(x.dtype), self.width(x))
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
@@ -185,8 +189,8 @@ class SelfShift(Protection):
         """
         return self.vsa.separate(self.vsa.permute(y, -self.decode(y)), self.h.to(y.dtype))
 
-    def config(self) -> dict[str, str | int]:
-        """See `Protection.config`; `h` itself is kept as a tensor."""
+    def config(self) -> dict[str, Any]:
+        """See `Part.config`; `h` itself is a tensor."""
         return {"name": self.name, "width": self.width_rule}
 
 
@@ -203,4 +207,11 @@ def _floats(x: Tensor) -> Tensor:
     return x.to(torch.float32) if is_integer(x) else x
 
 
-PROTECTIONS: dict[str, type[Protection]] = {p.name: p for p in (SelfShift, FixedShift, Unprotected)}
+PROTECTIONS: Registry[type[Protection]] = Registry(
+    "protection", {p.name: p for p in (SelfShift, FixedShift, Unprotected)}
+)
+
+
+def protection(config: Mapping[str, Any], vsa: VSA) -> Protection:
+    """The protection that a `config()` describes, as a plan."""
+    return PROTECTIONS.find(config.get("name")).from_config(config, vsa)

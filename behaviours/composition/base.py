@@ -1,20 +1,21 @@
 """The interface of policies that combine behaviours."""
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import cast
 
 import torch
-from jaxtyping import Int64, Shaped
+from jaxtyping import Shaped
 from torch import Tensor, nn
 
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
-from behaviours.recall import Recall, asked_once
+from behaviours.controller import Controller
+from behaviours.recall import Recall
 from torchvsa.blocks import by_blocks
 
 
-class Policy(nn.Module, ABC):
+class Policy(Controller):
     """Several behaviours of one bank as one: readings `[B, n]` in, a `Recall` with `speaker` out.
 
     `names` says which behaviours take part; `Recall.speaker` counts within it. A new policy implements
@@ -35,14 +36,9 @@ class Policy(nn.Module, ABC):
         """The behaviours that take part, in the order of `names`."""
         return cast(list[Behaviour], list(self._parts))
 
-    def forward(self, readings: Any) -> Recall:
-        """Commands for readings; NaN commands and speaker -1 where no sensor was observed."""
-        bins = self.space.bins(readings)
-        return asked_once(self._answer, bins).blank((bins < 0).all(-1))
-
-    def _answer(self, bins: Int64[Tensor, "batch n"]) -> Recall:
+    def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         # Some rows at a time: the conditions of all need not be held.
-        return by_blocks(lambda rows: self.ask(self.space.encode(rows)), bins, row_bytes=self.space.vsa.row_bytes)
+        return by_blocks(lambda rows: self.ask(self.space.encode(rows)), cells, row_bytes=self.space.vsa.row_bytes)
 
     @abstractmethod
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:

@@ -21,24 +21,24 @@ _PRINTS = 8
 
 
 class Conditions:
-    """`k` conditions of which the bins alone are held; indexed like a tensor `[k, d]`, it encodes what is asked for.
+    """`k` conditions of which the cells alone are held; indexed like a tensor `[k, d]`, it encodes what is asked for.
 
-    A million conditions of d = 4,000 bytes would take 4 GB, their bins a twentieth of it.
+    A million conditions of d = 4,000 bytes would take 4 GB, their cells a twentieth of it.
     """
 
-    def __init__(self, space: Space, bins: Int64[Tensor, "k n"]) -> None:
-        self.space, self.bins = space, bins
+    def __init__(self, space: Space, cells: Shaped[Tensor, "k w"]) -> None:
+        self.space, self.cells = space, cells
 
     def __len__(self) -> int:
-        return len(self.bins)
+        return len(self.cells)
 
     @property
     def device(self) -> torch.device:
         """Where they are encoded."""
-        return self.bins.device
+        return self.cells.device
 
     def __getitem__(self, index: Any) -> Shaped[Tensor, "*some d"]:
-        rows = self.bins[index]
+        rows = self.cells[index]
         return self.space.encode(rows[None])[0] if rows.dim() == 1 else self.space.encode(rows)
 
     def index_select(self, dim: int, index: Int64[Tensor, "some"]) -> Shaped[Tensor, "some d"]:
@@ -47,18 +47,18 @@ class Conditions:
 
     def split(self, size: int) -> Iterator[Shaped[Tensor, "some d"]]:
         """All of them in order, `size` at a time."""
-        return (self.space.encode(rows) for rows in self.bins.split(size))
+        return (self.space.encode(rows) for rows in self.cells.split(size))
 
 
 def encode_distinct(
-    space: Space, bins: Int64[Tensor, "N n"], progress: Progress = silent
+    space: Space, cells: Shaped[Tensor, "N w"], progress: Progress = silent
 ) -> tuple["Shaped[Tensor, 'k d'] | Conditions", Int64[Tensor, "N"]]:
     """The distinct conditions of these rows, in order of first appearance, and which of them each row has.
 
-    Conditions are the same if their hypervectors are. Rows of equal bins are found first, and only one of each is
+    Conditions are the same if their hypervectors are. Rows of equal cells are found first, and only one of each is
     encoded. `progress` is told the share that is done.
     """
-    distinct, condition = distinct_rows(bins)
+    distinct, condition = distinct_rows(cells)
     if len(distinct) * space.vsa.row_bytes <= HELD_BYTES:
         encoded, merged = distinct_rows(space.encode(distinct))
         return encoded, merged[condition]
@@ -67,7 +67,7 @@ def encode_distinct(
 
 
 def _merged(
-    space: Space, bins: Int64[Tensor, "k n"], progress: Progress
+    space: Space, cells: Shaped[Tensor, "k w"], progress: Progress
 ) -> tuple[Int64[Tensor, "c"], Int64[Tensor, "k"]]:
     """The row in which each distinct hypervector appears first, and for each row which of them it has.
 
@@ -76,16 +76,16 @@ def _merged(
     seed = 0
     while True:
         # Written into one tensor: many small ones, each behind a large one that is free again, keep memory in pieces.
-        done, prints = 0, torch.empty(len(bins), _PRINTS, dtype=torch.int64, device=bins.device)
-        for rows, into in zip(bins.split(_ROWS), prints.split(_ROWS), strict=True):
+        done, prints = 0, torch.empty(len(cells), _PRINTS, dtype=torch.int64, device=cells.device)
+        for rows, into in zip(cells.split(_ROWS), prints.split(_ROWS), strict=True):
             into.copy_(_fingerprints(space.encode(rows), seed))
             done += len(rows)
-            progress(done / len(bins))
+            progress(done / len(cells))
         _, merged = distinct_rows(prints)
         first = first_rows(merged)
-        later = (first[merged] != torch.arange(len(bins), device=bins.device)).nonzero()[:, 0]
+        later = (first[merged] != torch.arange(len(cells), device=cells.device)).nonzero()[:, 0]
         same = (
-            torch.equal(space.encode(bins[some]), space.encode(bins[first[merged[some]]]))
+            torch.equal(space.encode(cells[some]), space.encode(cells[first[merged[some]]]))
             for some in later.split(_ROWS)
         )
         if all(same):

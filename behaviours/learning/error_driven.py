@@ -67,7 +67,7 @@ class ErrorDriven(Rule):
         self, space: Space, samples: Samples, before: Behaviour | None = None, progress: Progress = silent
     ) -> Behaviour:
         targets = samples.targets(self.contradictions)
-        items = space.results(samples.results)
+        items = space.items(samples.results)
         trained = self._train(space.vsa, samples.conditions, targets, items, before, progress)
         program, passes, updates, wrong = trained
         progress(1.0)

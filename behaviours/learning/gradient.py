@@ -105,7 +105,7 @@ class Gradient(Rule):
     ) -> Behaviour:
         aims = shown.targets("first" if self.contradictions == "all" else self.contradictions)
         samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
-        items = space.results(samples.results)
+        items = space.items(samples.results)
         generator = torch.Generator().manual_seed(self.seed)
         train, held = self._split(samples, generator)
         training = _Training(self, space.vsa, samples, items, before)

@@ -55,7 +55,7 @@ class LeastSquares(Rule):
         shape = len(samples.conditions), len(samples.results)
         cells = samples.condition * shape[1] + samples.result
         counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
-        items = space.results(samples.results)
+        items = space.items(samples.results)
         targets = counts / counts.sum(1, keepdim=True)
         conditions = samples.conditions[:]
         program = solve(space.vsa, conditions, items, targets, self.ridge)

@@ -47,12 +47,12 @@ class Samples:
         `progress` is told the share that is done, if it takes long. Raises if a row has no observed sensor.
         """
         demonstrations.check_names(space.schema)
-        bins = space.bins(demonstrations.sensors)
-        blind = (bins < 0).all(-1)
+        cells = space.cells(demonstrations.sensors, demonstrations.episodes)
+        blind = (cells < 0).all(-1)
         if blind.any():
             raise ValueError(f"row {int(blind.nonzero()[0])} of the demonstration has no observed sensor")
-        levels = space.schema.command_levels(demonstrations.commands).to(bins.device)
-        conditions, condition = encode_distinct(space, bins, progress)
+        levels = space.schema.command_levels(demonstrations.commands).to(cells.device)
+        conditions, condition = encode_distinct(space, cells, progress)
         distinct_results, result = distinct_rows(levels)
         return cls(conditions, distinct_results, condition, result)
 

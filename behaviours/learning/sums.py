@@ -39,7 +39,7 @@ class Sums:
 
     def __init__(self, space: Space, samples: Samples, clip: bool, progress: Progress = silent) -> None:
         self.vsa, self.samples, self.clip = space.vsa, samples, clip
-        self.items = space.results(samples.results)
+        self.items = space.items(samples.results)
         nothing = torch.zeros(2, self.vsa.dim, dtype=self.vsa.accumulator, device=self.items.device)
         self.state = torch.zeros_like(self.vsa.normalize(nothing)) if clip else nothing
         self.progress = progress

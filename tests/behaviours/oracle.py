@@ -60,13 +60,13 @@ class Encoder:
         elif isinstance(space.protect, FixedShift):
             protection, fixed = "fixed", space.protect.shift
         return cls(
-            numbers(space.conditions.roles),
-            numbers(space.conditions.codes),
+            numbers(space.encoder.roles),
+            numbers(space.encoder.codes),
             numbers(space.results.roles),
             numbers(space.results.codes),
             [(s.low, s.high) for s in space.schema.sensors],
             [(a.low, a.high, a.levels) for a in space.schema.actuators],
-            space.encoder.combine,
+            space.encoder.name,
             protection,
             h,
             fixed,
@@ -96,7 +96,7 @@ class Encoder:
             for i, reading in enumerate(sensors)
             if not math.isnan(reading)  # not observed: left out
         ]
-        if self.combine == "bundle":
+        if self.combine == "sum":
             return bundle(*(part for _, part in parts))
         # Binding commutes: each sensor's part is rotated by its place, or nobody could tell whose it is.
         product = np.ones(self.dim, np.int64)

@@ -4,7 +4,7 @@ Answers are compared by cosines in float64; the operations are the architecture'
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -48,12 +48,12 @@ class Answer(NamedTuple):
 
 def query(behaviour: Behaviour, reading: list[float]) -> Answer:
     space, vsa = behaviour.space, behaviour.space.vsa
-    bins = space.schema.sensor_bins([reading], space.encoder.bins)[0].tolist()
-    record = space.conditions
+    bins = space.cells([reading])[0].tolist()
+    record: Any = space.encoder
     bound = [vsa.bind(record.roles[i], record.codes[b]) for i, b in enumerate(bins) if b >= 0]
     protected = space.protect(vsa.bundle(torch.stack(bound)))  # 1
     noisy = vsa.unbind(behaviour.program, protected)  # 2
-    stored = space.results(behaviour.results)
+    stored = space.items(behaviour.results)
     found = clean_up(stored, noisy)  # 3
     result = stored[found.winner]
     commands = []

@@ -6,8 +6,9 @@ import numpy as np
 import torch
 
 import torchvsa
-from behaviours import Actuator, Behaviour, Demonstrations, Encoder, Schema, Sensor, Space
+from behaviours import Actuator, Behaviour, Demonstrations, Schema, Sensor, Space
 from torchvsa import VSA
+from torchvsa.encoders import Encoder, Product, SubsetProduct, Sum, ThresholdFeatures, value_encoder
 
 BINS = 20
 LEVELS = 3
@@ -25,13 +26,46 @@ def space(
     dtype: str | None = None,
     protection: Any = "self_shift",
     seed: int = 0,
-    **encoder: Any,
+    results: str = "lookup",
+    **options: Any,
 ) -> Space:
-    """Codebooks for `SCHEMA`; MAP in exact integer codes unless another type is asked for."""
+    """Codebooks for `SCHEMA`; MAP in exact integer codes unless another type is asked for.
+
+    Parts are named, to be listed by parametrised tests: see `encoder` and `protections`.
+    """
     if isinstance(vsa, str):
         exact = "int8" if vsa.startswith("MAP") else None
         vsa = torchvsa.architecture(vsa, dim, dtype or exact)
-    return Space(SCHEMA, vsa, Encoder(BINS, **encoder), protection, seed)
+    return Space(
+        SCHEMA,
+        encoder(vsa, **options),
+        protection=protected(vsa, protection),
+        seed=seed,
+        command_codes=value_encoder({"name": results, "bins": LEVELS}, vsa),
+    )
+
+
+def encoder(
+    vsa: VSA,
+    sensors: int = 3,
+    bins: int = BINS,
+    values: str = "lookup",
+    combine: str = "sum",
+    subset: int | None = None,
+    **options: Any,
+) -> Encoder:
+    """An encoder by the names of its parts, as a plan."""
+    if combine == "threshold_features":
+        return ThresholdFeatures(vsa, sensors, bins, subset)
+    value = value_encoder({"name": values, "bins": bins, **options}, vsa)
+    if combine == "subset_product":
+        return SubsetProduct(value, sensors, subset)
+    return {"sum": Sum, "product": Product}[combine](value, sensors)
+
+
+def protected(vsa: VSA, given: Any) -> torchvsa.Protection:
+    """A protection by its name, or its configuration."""
+    return torchvsa.protection({"name": given} if isinstance(given, str) else given, vsa)
 
 
 def random_pairs(count: int, seed: int = 0) -> Demonstrations:

@@ -79,7 +79,7 @@ def test_learning_is_algorithm_1(case: Case) -> None:
     _, expected = learned(case)
     np.testing.assert_array_equal(behaviour.program.numpy(), expected.prog_hv)
     np.testing.assert_array_equal(behaviour.known.numpy(), expected.known_cond_hv)
-    np.testing.assert_array_equal(case.space.results(behaviour.results).numpy(), expected.results)
+    np.testing.assert_array_equal(case.space.items(behaviour.results).numpy(), expected.results)
     for i, values in enumerate(expected.values):
         levels = in_order_of_appearance(behaviour.results[:, i])
         np.testing.assert_array_equal(case.space.results.codes[levels].numpy(), values)

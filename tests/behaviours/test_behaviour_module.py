@@ -31,7 +31,7 @@ def test_a_loaded_state_answers_at_once(vsa: str) -> None:
 def test_the_state_is_all_there_is() -> None:
     behaviour = OneShot().fit(space(128), random_pairs(12))
     assert {"program", "known", "memory.levels"} <= set(behaviour.state_dict())
-    assert any(key.startswith("space.conditions.") for key in behaviour.state_dict())
+    assert any(key.startswith("space.encoder.") for key in behaviour.state_dict())
 
 
 def test_a_changed_program_answers_at_once() -> None:
@@ -51,7 +51,7 @@ def test_a_copy_is_its_own() -> None:
     expected = behaviour(shown.sensors)
     assert same(copy(shown.sensors), expected)
     copy.program.zero_()
-    copy.space.conditions.table.zero_()
+    copy.space.encoder.table.zero_()
     assert same(behaviour(shown.sensors), expected)
 
 

@@ -80,8 +80,8 @@ def test_a_settled_superposition_holds_each_condition_once_with_its_result(rows:
     for how in ("majority", "latest"):
         behaviour = OneShot(contradictions=how).fit(made, shown(rows))
         wanted = list(settle(rows, how).values())
-        items = made.results(made.schema.command_levels([COMMANDS[r] for r in wanted]))
-        conditions = made.encode(made.bins([[c + 0.5] * 3 for c in settle(rows, how)]))
+        items = made.items(made.schema.command_levels([COMMANDS[r] for r in wanted]))
+        conditions = made.encode(made.cells([[c + 0.5] * 3 for c in settle(rows, how)]))
         expected = (conditions.int() * items.int()).sum(0)
         assert behaviour.program.tolist() == expected.tolist()
         # Results that no condition has are not stored.

@@ -19,10 +19,10 @@ from behaviours import Behaviour, Demonstrations, ErrorDriven
 def leads(behaviour: Behaviour, pairs: Demonstrations) -> np.ndarray:
     """By how much each pair's result beats the best other one and silence, in scores that the pair gives itself."""
     made = behaviour.space
-    items = made.results(behaviour.results)
+    items = made.items(behaviour.results)
     levels = made.schema.command_levels(pairs.commands).tolist()
     found = []
-    for condition, level in zip(made.encode(made.bins(pairs.sensors)), levels, strict=True):
+    for condition, level in zip(made.encode(made.cells(pairs.sensors)), levels, strict=True):
         noisy = wide(made.vsa.unbind(behaviour.program, condition))
         scores = [float(np.vdot(wide(item), noisy).real) / np.linalg.norm(wide(item)) for item in items]
         own = behaviour.results.tolist().index(level)
@@ -63,8 +63,8 @@ def perceptron_steps(space_, shown: Demonstrations, margin: float) -> Iterator[t
     """The rule as its docstring says it, one pair after the other, in Python's own numbers: the program after each."""
     levels = space_.schema.command_levels(shown.commands).tolist()
     results = [list(level) for level in dict.fromkeys(map(tuple, levels))]
-    items = space_.results(torch.tensor(results)).numpy().astype(np.int64)
-    conditions = space_.encode(space_.bins(shown.sensors)).numpy().astype(np.int64)
+    items = space_.items(torch.tensor(results)).numpy().astype(np.int64)
+    conditions = space_.encode(space_.cells(shown.sensors)).numpy().astype(np.int64)
     program = np.zeros(space_.vsa.dim, np.int64)
     lengths = np.sqrt((items**2).sum(1))
     while True:
@@ -142,7 +142,7 @@ def test_known_is_the_sum_of_the_distinct_conditions() -> None:
     shown = random_pairs(300)
     twice = Demonstrations.join([shown, shown])
     made = space(128)
-    expected = made.encode(made.bins(shown.sensors)).numpy().astype(int).sum(0)
+    expected = made.encode(made.cells(shown.sensors)).numpy().astype(int).sum(0)
     np.testing.assert_array_equal(ErrorDriven(passes=1).fit(made, twice).known.numpy(), expected)
 
 

@@ -79,7 +79,7 @@ def policies() -> list[nn.Module]:
 def test_recall_compiles_whole(vsa: str) -> None:
     behaviour = ErrorDriven().fit(space(256, vsa), random_pairs(12))
     assert same(compiled(behaviour)(queries()), behaviour(queries()))
-    conditions = behaviour.space.encode(behaviour.space.bins(random_pairs(12).sensors))
+    conditions = behaviour.space.encode(behaviour.space.cells(random_pairs(12).sensors))
     assert same(compiled(behaviour.ask)(conditions), behaviour.ask(conditions))
 
 

@@ -42,7 +42,7 @@ def test_products_are_exact_for_programs_of_any_size(vsa: str, largest: int) -> 
     generator = torch.Generator().manual_seed(0)
     program = torch.randint(-largest, largest + 1, (301,), generator=generator, dtype=torch.int64).to(torch.int32)
     results = OneShot().fit(made, random_pairs(20)).results
-    items, conditions = made.results(results), made.encode(made.bins(READINGS[:20]))
+    items, conditions = made.items(results), made.encode(made.cells(READINGS[:20]))
     folded = Folded(made.vsa, program, program, items)
     assert folded.digital
     products = folded.products(conditions)
@@ -157,7 +157,7 @@ def test_a_compiled_reflex_answers_the_same() -> None:
 def test_conditions_in_a_wider_type_are_asked_the_plain_way() -> None:
     made = space(200, "MAP-I")
     behaviour = OneShot().fit(made, random_pairs(20))
-    conditions = made.encode(made.bins(READINGS[:20]))
+    conditions = made.encode(made.cells(READINGS[:20]))
     assert isinstance(made.vsa, MAP)
     assert conditions.dtype == torch.int32
     for row, answer in enumerate(zip(*behaviour.ask(conditions)[:4], strict=True)):

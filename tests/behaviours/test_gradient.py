@@ -29,7 +29,7 @@ def test_one_step_follows_the_gradient_of_the_loss(sparse: bool) -> None:
     shown, made = random_pairs(20), space(200)
     samples = Samples.of(made, shown)
     assert isinstance(samples.conditions, torch.Tensor)
-    items = made.results(samples.results)
+    items = made.items(samples.results)
     training = module._Training(Gradient(sparse=sparse), made.vsa, samples, items)
     rows = torch.arange(20)
     training.loss(rows).backward()
@@ -65,7 +65,9 @@ def one_sensor_decides() -> tuple[Space, Demonstrations]:
     """500 readings of three sensors; the commands follow the first alone."""
     sensors = torch.rand(500, 3, generator=torch.Generator().manual_seed(0)) * 20
     commands = torch.where(sensors[:, :1] > 7, 1.0, -1.0).expand(-1, 2)
-    return space(1000, protection="none", values="lookup", combine="thresholds"), Demonstrations(sensors, commands)
+    return space(1000, protection="none", values="lookup", combine="threshold_features"), Demonstrations(
+        sensors, commands
+    )
 
 
 def test_a_program_of_fractions_is_clipped_to_the_nearest_codes() -> None:

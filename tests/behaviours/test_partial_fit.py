@@ -78,7 +78,7 @@ def test_superposing_in_pieces_is_algorithm_1(
     expected = oracle.learn(encoder, shown.sensors.tolist(), shown.commands.tolist(), "similarity", limit, clip)
     np.testing.assert_array_equal(pieces.program.numpy(), expected.prog_hv)
     np.testing.assert_array_equal(pieces.known.numpy(), expected.known_cond_hv)
-    np.testing.assert_array_equal(made.results(pieces.results).numpy(), expected.results)
+    np.testing.assert_array_equal(made.items(pieces.results).numpy(), expected.results)
     report, once = pieces.report, whole.report
     # What is stored, and what is not, is the same; whether it was known before is only known within a piece.
     assert report.samples == once.samples
@@ -131,7 +131,7 @@ def test_reports_and_known_conditions_add_up(rule: Rule) -> None:
     if not isinstance(rule, OneShot):
         assert report.new == sum(r.new for r in alone)
         assert report.contradicting == sum(r.contradicting for r in alone)
-        sums = [made.encode(made.bins(piece.sensors)).unique(dim=0).int().sum(0) for piece in pieces]
+        sums = [made.encode(made.cells(piece.sensors)).unique(dim=0).int().sum(0) for piece in pieces]
         assert behaviour.known.tolist() == sum(sums, torch.zeros(4000, dtype=torch.int32)).tolist()
         assert report.updates > 0
         assert report.passes >= 3

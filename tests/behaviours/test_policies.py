@@ -64,8 +64,8 @@ def test_bundling_is_voting_for_any_weights(vsa: str, weights: list[float]) -> N
 def test_clipping_breaks_the_vote() -> None:
     bank, pairs = three(128)
     policy = Bundle(bank)
-    conditions = bank.space.encode(bank.space.bins(everything(pairs)))
-    items = bank.space.results(policy.behaviour.results)
+    conditions = bank.space.encode(bank.space.cells(everything(pairs)))
+    items = bank.space.items(policy.behaviour.results)
 
     def votes(program: torch.Tensor) -> torch.Tensor:
         return dots(bank.space.vsa.unbind(program, conditions), items).to(torch.int64)
@@ -131,10 +131,10 @@ def test_the_speaker_contributes_most_to_the_winner(weights: list[int]) -> None:
     policy = Bundle(bank, dict(zip(NAMES, weights, strict=True)))
     readings = everything(pairs)
     recall = policy(readings)
-    items = wide(bank.space.results(policy.behaviour.results)).real
+    items = wide(bank.space.items(policy.behaviour.results)).real
     programs = [w * wide(bank[name].program).real for w, name in zip(weights, NAMES, strict=True)]
     assert recall.speaker is not None
-    for row, condition in enumerate(wide(bank.space.encode(bank.space.bins(readings))).real):
+    for row, condition in enumerate(wide(bank.space.encode(bank.space.cells(readings))).real):
         scores = items @ (condition * sum(programs)) / np.linalg.norm(items, axis=1)
         winner = items[int(scores.argmax())]
         shares = [winner @ (condition * program) for program in programs]

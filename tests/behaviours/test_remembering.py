@@ -16,7 +16,7 @@ NAN = float("nan")
 def space(bins: int = 6) -> Space:
     schema = Schema([Sensor("a", 0, 1), Sensor("b", 0, 1)], [Actuator("x", -1, 1, levels=3)])
     vsa = torchvsa.MAP(dim=512, dtype=torch.int8)
-    return Space(schema, vsa, Encoder(bins=bins, combine="bind"), "none", seed=3)
+    return Space(schema, vsa, Encoder(bins=bins, combine="product"), "none", seed=3)
 
 
 def recording(count: int = 3, steps: int = 12, seed: int = 0) -> tuple[torch.Tensor, torch.Tensor, torch.Tensor]:

@@ -28,7 +28,7 @@ def test_no_two_codebooks_are_alike() -> None:
     made = space(4000)
     assert isinstance(made.protect, SelfShift)
     atoms = torch.cat(
-        [made.conditions.roles, made.conditions.codes, made.results.roles, made.results.codes, made.protect.h[None]]
+        [made.encoder.roles, made.encoder.codes, made.results.roles, made.results.codes, made.protect.h[None]]
     ).double()
     cosines = (atoms @ atoms.T / 4000).fill_diagonal_(0)
     assert cosines.abs().max() < 5 / 4000**0.5
@@ -38,7 +38,7 @@ def test_a_condition_is_encoded_then_protected() -> None:
     made = space(256)
     bins = torch.tensor([[1, 2, 3], [-1, 2, 3]])
     for row in bins:
-        parts = [made.conditions.roles[i] * made.conditions.codes[b] for i, b in enumerate(row.tolist()) if b >= 0]
+        parts = [made.encoder.roles[i] * made.encoder.codes[b] for i, b in enumerate(row.tolist()) if b >= 0]
         record = torch.stack(parts).sum(0).clamp(-1, 1).to(torch.int8)
         assert same_bits(made.encode(row[None])[0], made.protect(record))
 

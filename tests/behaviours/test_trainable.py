@@ -63,7 +63,7 @@ def test_scores_are_those_of_recall_and_have_their_gradient(vsa: str) -> None:
         behaviour.results.tolist().index(level)
         for level in made.schema.command_levels(behaviour(shown.sensors).commands).tolist()
     ]
-    conditions = made.encode(made.bins(shown.sensors))
+    conditions = made.encode(made.cells(shown.sensors))
     for row, condition in enumerate(conditions):
         noisy = wide(made.vsa.unbind(behaviour.program.detach(), condition))
         for column, item in enumerate(items):

@@ -135,11 +135,11 @@ def test_flipping_all_of_the_program_or_the_query_turns_the_order_of_the_results
 def test_the_codebooks_of_others_stay_whole_and_missing_readings_keep_their_entry() -> None:
     one = learner("default")
     assert isinstance(one, Programmed)
-    before = one.space.conditions.table.clone(), one.items.clone()
+    before = one.space.encoder.table.clone(), one.items.clone()
     damaged = one.damaged("codebooks", damage("noise", 0.25))
-    assert torch.equal(one.space.conditions.table, before[0])
+    assert torch.equal(one.space.encoder.table, before[0])
     assert torch.equal(one.items, before[1])
-    table = damaged.space.conditions.table
+    table = damaged.space.encoder.table
     assert torch.equal(table[:, -1], before[0][:, -1].float())
     hit = int((table != before[0]).sum()) + int((damaged.items != one.items).sum())
     assert hit == one.elements("codebooks") // 4 == (3 * 8 * 500 + len(one.items) * 500) // 4

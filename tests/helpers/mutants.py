@@ -23,10 +23,24 @@ from typing import Any
 import torch
 from torch import Tensor
 
-import torchvsa
-from behaviours import Actuator, BehaviourBank, Demonstrations, Encoder, ErrorDriven, OneShot, Schema, Sensor, Space
-from behaviours.remembering import RememberingSpace
+from behaviours import Actuator, BehaviourBank, Demonstrations, ErrorDriven, OneShot, Schema, Sensor, Space
 from behaviours.storage import load_tensors, save_tensors
+from torchvsa import BSC, FHRR, HRR, MAP, VSA, FixedShift, Protection, SelfShift
+from torchvsa.encoders import (
+    Balanced,
+    Circular,
+    Encoder,
+    FractionalPower,
+    History,
+    Level,
+    Lookup,
+    Product,
+    RandomFourier,
+    SubsetProduct,
+    Sum,
+    Thermometer,
+    ThresholdFeatures,
+)
 
 ROOM = 2**28
 """Bytes that loading a mutant may take; the files are of some kilobytes."""
@@ -52,21 +66,32 @@ HOSTILE: list[Any] = [
         [[]],
     ),
     *("MAP-I", "HRR", "BSC", "FHRR", "int8", "float16", "bfloat16", "float64", "complex64", "bool", "load", "C", "B"),
-    *("bind", "bundle", "subset", "thresholds", "level", "lookup", "balanced", "self_shift", "fixed_shift", "none"),
-    *({"name": "none"}, "mean", "sum", "clip", "error", "space", "remembering", "uniform", "bipolar"),
+    *(
+        "product",
+        "sum",
+        "subset_product",
+        "threshold_features",
+        "history",
+        "level",
+        "lookup",
+        "balanced",
+        "self_shift",
+        "fixed_shift",
+        "none",
+    ),
+    *({"name": "none"}, "mean", "sum", "clip", "error", "random_fourier", "circular", "uniform", "bipolar"),
 ]
+_EDGES = [torch.tensor([0.2, 0.5]), torch.tensor([0.1, 0.1, 0.9])]
 TYPES = ("F64", "F32", "F16", "BF16", "I8", "U8", "BOOL", "I32", "I64", "U64", "C64", "F8_E4M3", "F4", "X")
 
 
-def _bank(vsa: str, encoder: Encoder, protection: str | dict[str, Any], dtype: str | None = None, lags: int = 0) -> Any:
+def _bank(make: Callable[[VSA], Encoder], vsa: VSA, protection: Protection | None = None) -> BehaviourBank:
     schema = Schema(
-        [Sensor("left", 0, 1), Sensor("right", 0, 1, "m", "clip", (0.2, 0.5))],
+        [Sensor("left", 0, 1), Sensor("right", 0, 1, "m", "clip")],
         [Actuator("turn", -1, 1, levels=3), Actuator("go", 0, 1, levels=2)],
     )
-    space = Space(schema, torchvsa.architecture(vsa, 32, dtype), encoder, protection, seed=1)
-    if lags:
-        space = RememberingSpace(space, range(1, lags + 1))
-    readings = torch.rand(20, 2 * (1 + lags), generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    space = Space(schema, make(vsa), protection=protection, seed=1)
+    readings = torch.rand(20, 2, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
     commands = torch.stack([(readings[:, 0] - readings[:, 1]).sign(), (readings[:, 0] > 0.5).double()], 1)
     bank = BehaviourBank(space)
     bank.learn("steer", Demonstrations(readings[:12], commands[:12]), ErrorDriven())
@@ -77,14 +102,17 @@ def _bank(vsa: str, encoder: Encoder, protection: str | dict[str, Any], dtype: s
 @cache
 def originals() -> list[tuple[str, bytes]]:
     """Sound files of each kind, small ones."""
+    exact, floats, bits, fhrr = MAP(32, dtype=torch.int8), MAP(32), BSC(32), FHRR(32)
     kinds = [
-        _bank("MAP-C", Encoder(8, "level", "bind"), "none", "int8"),
-        _bank("MAP-C", Encoder(6), "self_shift"),
-        _bank("BSC", Encoder(6, combine="subset", subset=2), {"name": "fixed_shift", "shift": 3}),
-        _bank("FHRR", Encoder(5, "level"), "self_shift"),
-        _bank("HRR", Encoder(5, "balanced", "bind"), "none"),
-        _bank("MAP-B", Encoder(9, combine="thresholds", subset=2), "none", "int8"),
-        _bank("MAP-I", Encoder(4), "none", "int8", lags=1),
+        _bank(lambda vsa: Product(Level(vsa, 8), 2), exact),
+        _bank(lambda vsa: Sum(Lookup(vsa, 6), 2), floats, SelfShift(floats)),
+        _bank(lambda vsa: SubsetProduct(Lookup(vsa, 6), 2, 2), bits, FixedShift(bits, 3)),
+        _bank(lambda vsa: Sum(Level(vsa, 5), 2), fhrr, SelfShift(fhrr)),
+        _bank(lambda vsa: Product([Balanced(vsa, 5), Circular(vsa, 4)]), HRR(32)),
+        _bank(lambda vsa: ThresholdFeatures(vsa, 2, 9, 2, _EDGES), MAP(32, "B", torch.int8)),
+        _bank(lambda vsa: History(Sum(Thermometer(vsa, 4), 2), [1]), MAP(32, "I", torch.int8)),
+        _bank(lambda vsa: Sum(FractionalPower(vsa), 2), fhrr),
+        _bank(lambda vsa: RandomFourier(vsa, 2), floats),
     ]
     shown = Demonstrations([[0.1, math.nan], [0.2, 0.3], [0.5, 0.6]], [[0.0], [1.0], [0.5]], [0, 0, 1])
     files = []
@@ -320,7 +348,7 @@ def _broken(loaded: BehaviourBank | Demonstrations) -> str:
         1,
     )
     for name in loaded:
-        recall = loaded[name](readings)
+        recall, _ = loaded[name].step(readings, loaded[name].start(readings))
         for actuator, column in zip(loaded.space.schema.actuators, recall.commands.T, strict=True):
             seen = column[~readings.isnan().all(1)]
             if not ((seen >= actuator.low) & (seen <= actuator.high)).all():

@@ -10,27 +10,29 @@ from torchvsa.architectures.bsc import BSC
 from torchvsa.architectures.fhrr import FHRR
 from torchvsa.architectures.hrr import HRR
 from torchvsa.architectures.map import MAP
+from torchvsa.registry import Registry
 
-ARCHITECTURES: dict[str, Callable[..., VSA]] = {
-    "MAP-C": partial(MAP, variant="C"),
-    "MAP-B": partial(MAP, variant="B"),
-    "MAP-I": partial(MAP, variant="I"),
-    "HRR": HRR,
-    "FHRR": FHRR,
-    "BSC": BSC,
-}
+ARCHITECTURES: Registry[Callable[..., VSA]] = Registry(
+    "architecture",
+    {
+        "MAP-C": partial(MAP, variant="C"),
+        "MAP-B": partial(MAP, variant="B"),
+        "MAP-I": partial(MAP, variant="I"),
+        "HRR": HRR,
+        "FHRR": FHRR,
+        "BSC": BSC,
+    },
+)
 
 
 def architecture(name: str, dim: int, dtype: str | torch.dtype | None = None, **options: str) -> VSA:
     """Make an architecture by its name in `ARCHITECTURES`; without a `dtype`, of its default type."""
-    if name not in ARCHITECTURES:
-        raise ValueError(f"there is no architecture {name!r}; choose one of {', '.join(ARCHITECTURES)}")
+    make = ARCHITECTURES.find(name)
     if isinstance(dtype, str):
         found = getattr(torch, dtype, None)
         if not isinstance(found, torch.dtype):
             raise ValueError(f"there is no element type {dtype!r}; write e.g. 'float32' or 'int8'")
         dtype = found
-    make = ARCHITECTURES[name]
     for option, fixed in (make.keywords if isinstance(make, partial) else {}).items():
         if options.get(option, fixed) != fixed:
             raise ValueError(f"{name} has the {option} {fixed!r}; got {option}={options[option]!r}")

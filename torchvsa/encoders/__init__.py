@@ -1,13 +1,12 @@
 """Encoders: readings in [0, 1], NaN for unobserved, become hypervectors."""
 
 from torchvsa.encoders.balanced import Balanced
-from torchvsa.encoders.base import Encoder, ValueEncoder
+from torchvsa.encoders.base import Binned, Encoder, ValueEncoder
 from torchvsa.encoders.circular import Circular
 from torchvsa.encoders.fractional_power import FractionalPower
 from torchvsa.encoders.history import History
 from torchvsa.encoders.level import Level
 from torchvsa.encoders.lookup import Lookup
-from torchvsa.encoders.part import Part
 from torchvsa.encoders.product import Product
 from torchvsa.encoders.random_fourier import RandomFourier
 from torchvsa.encoders.record import Record
@@ -16,6 +15,7 @@ from torchvsa.encoders.subset_product import SubsetProduct
 from torchvsa.encoders.sum import Sum
 from torchvsa.encoders.thermometer import Thermometer
 from torchvsa.encoders.threshold_features import ThresholdFeatures
+from torchvsa.part import Part
 
 for part in (Lookup, Level, Balanced, Thermometer, Circular, FractionalPower):
     VALUE_ENCODERS.register(part.name, part)
@@ -26,6 +26,7 @@ __all__ = [
     "ENCODERS",
     "VALUE_ENCODERS",
     "Balanced",
+    "Binned",
     "Circular",
     "Encoder",
     "FractionalPower",

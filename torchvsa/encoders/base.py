@@ -11,10 +11,12 @@ from torch import Tensor
 from torchvsa._checks import whole_number
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
-from torchvsa.encoders.part import Layout, Part
 from torchvsa.errors import ShapeError
+from torchvsa.part import Layout, Part
 
 P = TypeVar("P", bound=Part)
+_ROUNDING = 1 + 2.0**-50
+"""Covers the three roundings in float64 between a reading and its position among the bins."""
 
 UNOBSERVED = -1
 """The cell of a reading that was not observed."""
@@ -57,8 +59,7 @@ class Encoder(Part):
         if x.dim() != 2 or x.shape[1] != self.width:
             raise ShapeError(f"readings must be [batch, {self.width}], one column per sensor; got {tuple(x.shape)}")
         check_range(x)
-        if not self.drawn:
-            raise ValueError(f"this {self.name} encoder has no codebooks yet; make it with a seed, or call draw()")
+        self._require_drawn()
         return self.encode(self.cells(x))
 
     # -- what encoders with a memory change, see `History` ----------------------------------------------
@@ -100,8 +101,7 @@ class ValueEncoder(Part):
         check_range(x)
         if not torch.compiler.is_compiling() and x.isnan().any():
             raise ValueError("a value that was not observed has no hypervector; records leave it out")
-        if not self.drawn:
-            raise ValueError(f"this {self.name} encoder has no codebooks yet; make it with a seed, or call draw()")
+        self._require_drawn()
         return self.encode(self.cells(x))
 
 
@@ -148,8 +148,11 @@ class Binned(ValueEncoder):
 
 
 def binned(x: Float[Tensor, "*batch"], bins: int) -> Int64[Tensor, "*batch"]:
-    """The bin of each value among `bins` of equal width over [0, 1], -1 for NaN."""
-    index = (x * bins).floor().clamp(0, bins - 1)
+    """The bin of each value among `bins` of equal width over [0, 1], -1 for NaN.
+
+    A value that is an edge but for rounding (7 of a range of 25, in 25 bins) is in the bin above the edge.
+    """
+    index = (x * (bins * _ROUNDING)).floor().clamp(0, bins - 1)
     return torch.where(x.isnan(), float(UNOBSERVED), index).to(torch.int64)
 
 

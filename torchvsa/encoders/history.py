@@ -11,8 +11,8 @@ from torch import Tensor
 from torchvsa.architectures import VSA
 from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Encoder, planned
-from torchvsa.encoders.part import Layout
 from torchvsa.encoders.registry import encoder
+from torchvsa.part import Layout
 
 
 class History(Encoder):
@@ -87,20 +87,7 @@ class History(Encoder):
         Equal to what `start` and `step` give for the same readings, one by one. Raises `ValueError` if the rows of an
         episode are not next to each other.
         """
-        begins = torch.ones(len(episodes), dtype=torch.bool, device=episodes.device)
-        begins[1:] = episodes[1:] != episodes[:-1]
-        if int(begins.sum()) != len(episodes.unique()):
-            raise ValueError("the rows of an episode must stand together, in the order of its steps")
-        if self.hold:
-            x = _held(x, begins)
-        columns = [x]
-        for lag in self.lags:
-            past = torch.full_like(x, torch.nan)
-            if lag < len(x):
-                same = (episodes[lag:] == episodes[:-lag])[:, None]
-                past[lag:] = torch.where(same, x[:-lag], torch.nan)
-            columns.append(past)
-        return torch.cat(columns, -1)
+        return windows(x, episodes, self.lags, self.hold)
 
     def start(self, batch: int) -> Float[Tensor, "batch past n"]:
         """No past: all of it NaN."""
@@ -115,6 +102,26 @@ class History(Encoder):
             x = torch.where(x.isnan(), past[:, 0], x)
         kept = torch.cat([x[:, None].to(past.dtype), past], 1)
         return kept[:, [0, *self.lags]].flatten(1), kept[:, :-1]
+
+
+def windows(
+    x: Float[Tensor, "N n"], episodes: Int64[Tensor, "N"], lags: Sequence[int], hold: bool = False
+) -> Float[Tensor, "N w"]:
+    """Each row with those `lags` rows before it in its episode, NaN where there are none; see `History.windows`."""
+    begins = torch.ones(len(episodes), dtype=torch.bool, device=episodes.device)
+    begins[1:] = episodes[1:] != episodes[:-1]
+    if int(begins.sum()) != len(episodes.unique()):
+        raise ValueError("the rows of an episode must stand together, in the order of its steps")
+    if hold:
+        x = _held(x, begins)
+    columns = [x]
+    for lag in _checked(lags):
+        past = torch.full_like(x, torch.nan)
+        if lag < len(x):
+            same = (episodes[lag:] == episodes[:-lag])[:, None]
+            past[lag:] = torch.where(same, x[:-lag], torch.nan)
+        columns.append(past)
+    return torch.cat(columns, -1)
 
 
 def _held(x: Tensor, begins: Tensor) -> Tensor:

@@ -7,8 +7,8 @@ import torch
 from jaxtyping import Bool, Int64, Shaped
 from torch import Tensor
 
-from torchvsa.encoders.part import Layout
 from torchvsa.encoders.record import Record, places
+from torchvsa.part import Layout
 
 
 class Product(Record):

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from torchvsa.architectures import VSA
 from torchvsa.encoders.base import Encoder, continuous, whole
-from torchvsa.encoders.part import Layout
+from torchvsa.part import Layout
 
 
 class RandomFourier(Encoder):

@@ -12,8 +12,8 @@ from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Binned, Encoder, ValueEncoder, planned, whole
-from torchvsa.encoders.part import Layout, Part
 from torchvsa.encoders.registry import value_encoder
+from torchvsa.part import Layout, Part
 
 
 class Record(Encoder):
@@ -62,6 +62,28 @@ class Record(Encoder):
         """The value encoder of each sensor."""
         values: Any = list(self.values)
         return values * self.sensors if self.shared else values
+
+    @property
+    def value(self) -> ValueEncoder:
+        """The value encoder of all sensors. Raises `ValueError` if each has its own."""
+        if not self.shared:
+            raise ValueError("each sensor of this record has a value encoder of its own; see `values`")
+        return self._values[0]
+
+    @property
+    def codes(self) -> Shaped[Tensor, "bins d"]:
+        """The codes of the bins that all sensors share. Raises `ValueError` if there are none."""
+        if not isinstance(self.value, Binned):
+            raise ValueError("a continuous value encoder has no codes of bins")
+        return self.value.codes
+
+    @property
+    def bins(self) -> int:
+        """Bins per sensor, the most where sensors differ. Raises `ValueError` for continuous value encoders."""
+        values: Any = self._values
+        if not self.discrete:
+            raise ValueError("a continuous value encoder has no bins")
+        return max(value.bins for value in values)
 
     def parts(self) -> dict[str, Part]:
         """See `Part.parts`: the value encoders, each once."""

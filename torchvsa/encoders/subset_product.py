@@ -8,8 +8,8 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from torchvsa.encoders.base import ValueEncoder, whole
-from torchvsa.encoders.part import Layout
 from torchvsa.encoders.product import Product
+from torchvsa.part import Layout
 
 
 class SubsetProduct(Product):

@@ -10,7 +10,7 @@ from torch import Tensor
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.encoders.base import Encoder, binned, whole
-from torchvsa.encoders.part import Layout
+from torchvsa.part import Layout
 
 _CONSTANT = 1 / 16
 """The share of dimensions that ask nothing: few, and enough to carry a constant answer."""

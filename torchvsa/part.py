@@ -71,6 +71,10 @@ class Part(nn.Module, ABC):
             part.drawn for part in self.parts().values()
         )
 
+    def _require_drawn(self) -> None:
+        if not self.drawn:
+            raise ValueError(f"this {self.name!r} part has no codebooks yet; make it with a seed, or call draw()")
+
     def layout(self) -> Layout:
         """The types and shapes of all tensors, by the names that they have in `state_dict`."""
         layout = dict(self.own_layout())

@@ -1,0 +1,52 @@
+"""What drives a robot: readings in, a `Recall` out, one control step after the other."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Sized
+from typing import Any
+
+from jaxtyping import Shaped
+from torch import Tensor, nn
+
+from behaviours.recall import Recall, asked_once
+from behaviours.space import Space
+
+
+class Controller(nn.Module, ABC):
+    """The interface of behaviours, and of policies that combine them.
+
+    Called with readings `[B, n]` it answers each row by itself. Where conditions hold a memory of past readings
+    (`torchvsa.encoders.History`), or a policy has a state of its own, `start` and `step` hand it on explicitly, as a
+    PyTorch RNN cell does:
+
+        state = controller.start(episodes)
+        recall, state = controller.step(readings, state)
+
+    The state has one row per robot; robots never influence each other. Without a memory it is empty.
+    """
+
+    space: Space
+
+    def forward(self, readings: Any) -> Recall:
+        """Commands `[B, m]` for readings `[B, n]`, with similarity, margin and familiarity (see `Recall`).
+
+        Raises an error that names sensor, row and range for readings that are not valid. A graph (`torch.compile`,
+        `torch.export`) takes readings as a tensor and cannot raise: there, those out of range are clipped.
+        """
+        return self.answer(self.space.cells(readings))
+
+    def start(self, episodes: Sized) -> Any:
+        """The state before the first step of these episodes, one per robot."""
+        return self.space.start(len(episodes))
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        """Commands for the readings `[B, n]` of the next step, and the state after it."""
+        cells, state = self.space.step(readings, state)
+        return self.answer(cells), state
+
+    def answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
+        """Commands for cells as `Space.cells` returns them; NaN commands where no sensor was observed."""
+        return asked_once(self._answer, cells).blank((cells < 0).all(-1))
+
+    @abstractmethod
+    def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
+        """Commands for cells of which at least one in each row was observed."""
