@@ -9,12 +9,13 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robots import random_pairs, same_bits, space
+from robots import protected, random_pairs, same_bits, space
 from torch.testing import assert_close
 
 import torchvsa
-from behaviours import Actuator, Demonstrations, Encoder, ErrorDriven, OneShot, Rule, Schema, Sensor, Space
+from behaviours import Actuator, Demonstrations, ErrorDriven, OneShot, Rule, Schema, Sensor, Space
 from behaviours.ordered import in_order_of_appearance
+from torchvsa.encoders import Level, Lookup, Product, Sum
 
 PROTECTIONS = (
     {"name": "self_shift", "width": "mean"},
@@ -42,13 +43,11 @@ def cases(draw: st.DrawFn) -> Case:
         [Sensor(f"s{i}", -i, 2.0 + i) for i in range(sensors)],
         [Actuator(f"a{i}", -1 - i, 1, levels=2 + i) for i in range(actuators)],
     )
-    encoder = Encoder(
-        bins=draw(st.integers(1, 6)),
-        values=draw(st.sampled_from(["lookup", "level"])),
-        combine=draw(st.sampled_from(["bundle", "bundle", "bind"])),
-    )
+    bins, values = draw(st.integers(1, 6)), draw(st.sampled_from([Lookup, Level]))
+    record = draw(st.sampled_from([Sum, Sum, Product]))
     vsa = torchvsa.MAP(dim, dtype=draw(st.sampled_from([torch.int8, torch.float32])))
-    made = Space(schema, vsa, encoder, draw(st.sampled_from(PROTECTIONS)), draw(st.integers(0, 5)))
+    protection = protected(vsa, draw(st.sampled_from(PROTECTIONS)))
+    made = Space(schema, record(values(vsa, bins), sensors), protection=protection, seed=draw(st.integers(0, 5)))
 
     reading = [st.one_of(st.floats(s.low, s.high), st.just(math.nan)) for s in schema.sensors]
     condition = st.tuples(*reading).map(list)

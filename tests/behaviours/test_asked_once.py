@@ -10,14 +10,11 @@ from robots import random_pairs, same_bits, space
 from torch import Tensor
 
 from behaviours import POLICIES, BehaviourBank, Recall, Space
-from behaviours.remembering import RememberingSpace
 
 
 def minds(made: Space) -> dict[str, Callable[[Any], Recall]]:
     bank = BehaviourBank(made)
     shown = random_pairs(12)
-    if isinstance(made, RememberingSpace):
-        shown = shown.__class__(torch.cat([shown.sensors, shown.sensors.flip(0)], 1), shown.commands)
     bank.learn("low", shown.where([row < 6 for row in range(12)]))
     bank.learn("high", shown.where([row >= 6 for row in range(12)]))
     return {"low": bank["low"], **{name: cast(Any, policy)(bank) for name, policy in POLICIES.items()}}
@@ -32,17 +29,14 @@ def readings(columns: int) -> Tensor:
 
 
 @pytest.mark.parametrize("mind", ["low", *POLICIES])
-@pytest.mark.parametrize("lags", [[], [1]])
 @pytest.mark.parametrize("vsa", ["MAP-C", "BSC"])
-def test_repeated_readings_are_answered_as_alone(
-    vsa: str, lags: list[int], mind: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    made = RememberingSpace(space(300, vsa), lags) if lags else space(300, vsa)
+def test_repeated_readings_are_answered_as_alone(vsa: str, mind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = space(300, vsa)
     asked = minds(made)[mind]
-    rows = readings(3 * (1 + len(lags)))
+    rows = readings(3)
     encoded: list[int] = []
     encode = made.encode
-    monkeypatch.setattr(made, "encode", lambda bins: (encoded.append(len(bins)), encode(bins))[1])
+    monkeypatch.setattr(made, "encode", lambda cells: (encoded.append(len(cells)), encode(cells))[1])
     whole = asked(rows)
     assert sum(encoded) <= 31
     alone = [asked(row[None]) for row in rows]

@@ -120,7 +120,7 @@ def test_names_travel_in_files(tmp_path: Path) -> None:
 
 def test_swapped_columns_are_not_another_robot() -> None:
     sensors = [Sensor("left", 0, 9), Sensor("right", 0, 9)]
-    bank = BehaviourBank(Space(Schema(sensors, [Actuator("wheel", 0, 1)]), MAP(64)))
+    bank = BehaviourBank(Space(Schema(sensors, [Actuator("wheel", 0, 1)]), vsa=MAP(64)))
     bank.learn("steer", named())
     named().check(bank.space.schema)
     swapped = Demonstrations(FRAME[["right", "left"]], FRAME["wheel"])

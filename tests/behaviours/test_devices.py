@@ -29,11 +29,11 @@ from behaviours import (
     Rule,
     Space,
 )
-from behaviours.remembering import RememberingSpace, windows
-from behaviours.schema import quantile_edges
-from torchvsa import ARCHITECTURES, PROTECTIONS, CleanUp, Record, SelfShift, Thresholds
+from behaviours.edges import quantile_edges
+from torchvsa import ARCHITECTURES, PROTECTIONS, CleanUp, SelfShift
 from torchvsa.blocks import by_blocks
-from torchvsa.encoding import COMBINATIONS, VALUES
+from torchvsa.encoders import Encoder, History, Product, SubsetProduct, Sum, ThresholdFeatures, value_encoder
+from torchvsa.encoders.history import windows
 
 SHOWN = random_pairs(40)
 TWICE = Demonstrations(SHOWN.sensors.repeat(2, 1), torch.cat([SHOWN.commands, SHOWN.commands.flip(0)]))
@@ -157,12 +157,12 @@ def check_graph() -> None:
 
     vsa = torchvsa.MAP(100, dtype=torch.int8)
     vectors = vsa.bundle(vsa.random(200, 3, generator=seeded(0)))
-    protect, asked = moved(SelfShift(vsa)), moved(vectors)
+    protect, asked = moved(SelfShift(vsa, seed=0)), moved(vectors)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(torch.compiler, "is_compiling", lambda: True)
         patch.delattr("torchvsa.operators.rotation._windows")
         answer = brought_back(protect(asked))
-    assert torch.equal(answer, SelfShift(vsa)(vectors))
+    assert torch.equal(answer, SelfShift(vsa, seed=0)(vectors))
 
 
 @pytest.mark.parametrize("rows", [3, 200])
@@ -174,22 +174,23 @@ def test_modules(there: Callable[..., None], name: str, rows: int) -> None:
 def check_modules(name: str, rows: int) -> None:
     vsa = torchvsa.architecture(name, 100)
     vectors = vsa.random(rows, generator=seeded(0))
-    for protection in PROTECTIONS.values():
-        protect = protection(vsa)
+    for protection in PROTECTIONS:
+        protect = torchvsa.protection({"name": protection}, vsa).draw(seeded(3))
         same(lambda protect, x: protect(x), protect, vectors, exact=vsa.integer)
         same(lambda protect, y: protect.invert(y), protect, protect(vectors), exact=vsa.integer)
     same(lambda memory, x: memory(x), CleanUp(vectors[:3]), vectors, exact=False)
-    indices = torch.randint(-1, 5, (rows, 3), generator=seeded(1))
-    encoders: list[Any] = [
-        Record(vsa, 3, 5, values, combine, seeded(2))
-        for values in VALUES
-        for combine in COMBINATIONS
-        if vsa.elementwise or combine != "subset"
+    x = torch.rand(rows, 3, generator=seeded(1), dtype=torch.float64)
+    x[::4, 1] = torch.nan
+    encoders: list[Encoder] = [
+        record(value_encoder({"name": values, "bins": 5}, vsa), 3)
+        for values in ("lookup", "level", "balanced", "thermometer", "circular")
+        for record in (Sum, Product, SubsetProduct)
+        if vsa.elementwise or record is not SubsetProduct
     ]
     if vsa.elementwise:
-        encoders.append(Thresholds(vsa, 3, 5, generator=seeded(2)))
+        encoders.append(ThresholdFeatures(vsa, 3, 5))
     for encoder in encoders:
-        same(lambda encode, rows: encode(rows), encoder, indices, exact=vsa.integer)
+        same(lambda encode, rows: encode(rows), encoder.draw(seeded(2)), x, exact=vsa.integer)
 
 
 RULES_AND_OPTIONS: list[Rule] = [
@@ -292,9 +293,8 @@ def check_demonstrations() -> None:
         same(lambda r, e, hold=hold: windows(r, e, [1, 3], hold), lost, episodes, waits=True)
     same(lambda readings: quantile_edges(readings, 5), SHOWN.sensors[:, 0], waits=True)
     assert len(shown.where([row < 5 for row in range(80)])) == 5
-    remembering = RememberingSpace(here, [1])
-    bins = remembering.bins(windows(SHOWN.sensors, episodes, [1]))
-    same(lambda space, rows: space.encode(rows), remembering, bins)
+    history = History(here.encoder, [1])
+    same(lambda encode, rows: encode(rows), history, history.windows(here.schema.normalise(SHOWN.sensors), episodes))
 
 
 @pytest.mark.parametrize("policy", POLICIES.values(), ids=POLICIES.keys())

@@ -136,7 +136,7 @@ def test_integers_of_numpy_are_integers() -> None:
 @pytest.mark.parametrize("model", [classifier, regressor])
 def test_bins_that_no_memory_holds(model: Any) -> None:
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(ValueError, match=r"bins=1,000,000,000,000 for each of 3 features needs 120 TB of memory"):
+    with pytest.raises(ValueError, match=r"bins=1,000,000,000,000 for each of 3 features needs 72 TB of memory"):
         model(bins=10**12).fit(X, LABELS)
     # In units of 1,024 bytes: nothing was taken on the way there.
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 100_000

@@ -10,7 +10,7 @@ import numpy as np
 import onnxruntime
 import pytest
 import torch
-from robots import random_pairs, same_bits, space
+from robots import encoder, protected, random_pairs, same_bits, space
 from torch import nn
 
 import torchvsa
@@ -20,7 +20,6 @@ from behaviours import (
     BehaviourClassifier,
     Bundle,
     Demonstrations,
-    Encoder,
     ErrorDriven,
     Gradient,
     OneShot,
@@ -33,6 +32,7 @@ from behaviours import (
 from behaviours import onnx as module
 from behaviours.onnx import OUTPUTS, to_onnx
 from torchvsa import ARCHITECTURES
+from torchvsa.encoders import ThresholdFeatures
 
 BATCH = ({0: torch.export.Dim("batch")},)
 
@@ -148,10 +148,10 @@ def corral() -> tuple[Schema, Demonstrations]:
 
 
 CASES = {
-    "integers": ("int8", Encoder(16, "lookup", "bundle"), "none"),
-    "floats": ("float32", Encoder(16, "lookup", "bundle"), "none"),
-    "level and bind": ("int8", Encoder(16, "level", "bind"), "none"),
-    "protected": ("int8", Encoder(8, "level", "bundle"), "self_shift"),
+    "integers": ("int8", {"bins": 16}, "none"),
+    "floats": ("float32", {"bins": 16}, "none"),
+    "level and bind": ("int8", {"bins": 16, "values": "level", "combine": "product"}, "none"),
+    "protected": ("int8", {"bins": 8, "values": "level"}, "self_shift"),
 }
 
 
@@ -160,9 +160,10 @@ QUICK = ("integers", "level and bind")
 
 @pytest.mark.parametrize("case", [pytest.param(c, marks=() if c in QUICK else pytest.mark.slow) for c in CASES])
 def test_onnxruntime_gives_the_same_commands(case: str, tmp_path: Path) -> None:
-    dtype, encoder, protection = CASES[case]
+    dtype, options, protection = CASES[case]
     schema, shown = corral()
-    made = Space(schema, torchvsa.architecture("MAP-C", 512, dtype), encoder, protection)
+    vsa = torchvsa.architecture("MAP-C", 512, dtype)
+    made = Space(schema, encoder(vsa, **options), protection=protected(vsa, protection))
     behaviour = ErrorDriven().fit(made, shown)
     path = to_onnx(behaviour, tmp_path / "corral.onnx")
     blind = torch.cat([shown.sensors, torch.full((1, 3), torch.nan, dtype=torch.float64)])
@@ -184,9 +185,10 @@ def test_a_classifier_in_onnxruntime(tmp_path: Path) -> None:
     commands = answers(path, X)[0][:, 0].numpy().astype(int)
     np.testing.assert_array_equal(model.classes_[commands], model.predict(X))
     # Beyond the training rows, and on an edge between two bins.
-    edges = model.behaviour_.space.schema.sensors[0].edges
-    assert edges is not None
-    odd = np.array([[99.0, -99, 0], [edges[7], 0, 0]])
+    features = cast(ThresholdFeatures, model.behaviour_.space.encoder)
+    sensor = model.behaviour_.space.schema.sensors[0]
+    edge = sensor.low + float(features.edges[0, 7]) * (sensor.high - sensor.low)
+    odd = np.array([[99.0, -99, 0], [edge, 0, 0]])
     np.testing.assert_array_equal(answers(path, odd)[0].numpy(), model.behaviour_(odd).commands.numpy())
 
 

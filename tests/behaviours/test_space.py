@@ -1,11 +1,14 @@
 """Codebooks: drawn from the seed alone, made of named parts."""
 
+from typing import Any, cast
+
 import pytest
 import torch
 from robots import SCHEMA, same_bits, space
 
-from behaviours import Encoder, Space
-from torchvsa import ARCHITECTURES, MAP, FixedShift, SelfShift
+from behaviours import Space
+from torchvsa import ARCHITECTURES, MAP, SelfShift
+from torchvsa.encoders import Level, Lookup, Product, Sum
 
 
 def bits(made: Space) -> dict[str, torch.Tensor]:
@@ -43,16 +46,22 @@ def test_a_condition_is_encoded_then_protected() -> None:
         assert same_bits(made.encode(row[None])[0], made.protect(record))
 
 
-def test_a_protection_may_be_given_by_name_with_options_or_whole() -> None:
-    assert isinstance(space(64, protection="none").protect, torch.nn.Module)
-    shifted = space(64, protection={"name": "fixed_shift", "shift": 5}).protect
-    assert isinstance(shifted, FixedShift)
-    assert shifted.shift == 5
+def test_what_has_codebooks_is_kept_and_plans_are_copied() -> None:
     vsa = MAP(64, dtype=torch.int8)
-    given = SelfShift(vsa, width="sum", seed=3)
-    assert space(vsa=vsa, protection=given).protect is given
-    with pytest.raises(ValueError, match="the protection works on MAP-C"):
-        space(128, protection=given)
+    given, plan = SelfShift(vsa, width="sum", seed=3), Product(Level(vsa, 8), 3)
+    one, two = (Space(SCHEMA, plan, protection=given, seed=seed) for seed in (0, 1))
+    assert one.protect is two.protect is given
+    assert not plan.drawn
+    assert not torch.equal(cast(Product, one.encoder).roles, cast(Product, two.encoder).roles)
+    drawn = Product(Level(vsa, 8), 3, seed=0)
+    assert Space(SCHEMA, drawn).encoder is drawn
+
+
+def test_an_encoder_a_vsa_or_neither() -> None:
+    assert Space(SCHEMA).vsa == MAP(4000, dtype=torch.int8)
+    assert Space(SCHEMA, vsa=MAP(64)).encoder.vsa == MAP(64)
+    encoder = Sum(Lookup(MAP(64), 8), 3)
+    assert Space(SCHEMA, encoder, MAP(64)).vsa == MAP(64)
 
 
 def test_an_equal_space_is_made_from_its_config() -> None:
@@ -62,13 +71,31 @@ def test_an_equal_space_is_made_from_its_config() -> None:
     assert all(same_bits(value, bits(again)[key]) for key, value in bits(made).items())
 
 
-def test_parts_that_do_not_exist() -> None:
-    vsa = MAP(64)
+VSA = MAP(64)
+WRONG: dict[str, dict[str, Any]] = {
+    "encoder is an object such as": {"encoder": VSA},
+    "vsa is an object such as": {"vsa": "MAP-C"},
+    "protection is an object such as": {"protection": SelfShift},
+    "the encoder works on MAP-C": {"encoder": Sum(Lookup(VSA, 8), 3), "vsa": MAP(32)},
+    "the encoder is for 2 sensors; the schema has 3": {"encoder": Sum(Lookup(VSA, 8), 2)},
+    "SelfShift works on MAP-C": {"vsa": MAP(32), "protection": SelfShift(VSA)},
+    "the codes of commands are for 4 levels; the schema has 3": {"vsa": VSA, "command_codes": Lookup(VSA, 4)},
+    "seed is a whole number": {"seed": 0.5},
+    r"seed is a whole number in \[0, 2\^63\)": {"seed": -1},
+}
+
+
+@pytest.mark.parametrize("message", WRONG)
+def test_parts_that_do_not_fit(message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Space(SCHEMA, **WRONG[message])
+
+
+def test_configurations_of_parts_that_do_not_exist() -> None:
+    config = space(64).config()
     with pytest.raises(ValueError, match="no protection 'helmet'; choose one of self_shift, fixed_shift, none"):
-        Space(SCHEMA, vsa, protection="helmet")
+        Space.from_config(config | {"protection": {"name": "helmet"}})
+    with pytest.raises(ValueError, match="no encoder 'knot'; choose one of sum, product"):
+        Space.from_config(config | {"encoder": config["encoder"] | {"name": "knot"}})
     with pytest.raises(ValueError, match="no value encoder 'rainbow'"):
-        Space(SCHEMA, vsa, Encoder(values="rainbow"))
-    with pytest.raises(ValueError, match="no combination 'knot'"):
-        Space(SCHEMA, vsa, Encoder(combine="knot"))
-    with pytest.raises(ValueError, match="bins is a whole number of at least 1; got 0"):
-        Space(SCHEMA, vsa, Encoder(bins=0))
+        Space.from_config(config | {"command_codes": {"name": "rainbow"}})

@@ -90,7 +90,7 @@ def test_recall_by_age_against_asking_one_by_one(panel: Recalled) -> None:
     readings: dict[tuple[int, ...], torch.Tensor] = {}
     space = rules[DEFAULT][0]
     for reading, command in zip(run.train.sensors, run.train.commands.numpy(), strict=True):
-        condition = tuple(space.bins(reading[None])[0].tolist())
+        condition = tuple(space.cells(reading[None])[0].tolist())
         commands.setdefault(condition, set()).add(name_of(command))
         readings.setdefault(condition, reading)
     order = list(commands)
@@ -217,11 +217,11 @@ def test_differences_on_the_edge_of_a_threshold(who: str) -> None:
     assert mind is not None
     asked: dict[tuple[int, ...], set[str]] = {}
     for part in (run.train, run.heldout):
-        for bins, command in zip(mind.space.bins(part.sensors).tolist(), part.commands.numpy(), strict=True):
+        for bins, command in zip(mind.space.cells(part.sensors).tolist(), part.commands.numpy(), strict=True):
             asked.setdefault(tuple(bins), set()).add(name_of(command))
     edge = []
     answers = mind(run.heldout.sensors).commands.numpy()
-    conditions = mind.space.bins(run.heldout.sensors).tolist()
+    conditions = mind.space.cells(run.heldout.sensors).tolist()
     for bins, answer, command in zip(conditions, answers, run.heldout.commands.numpy(), strict=True):
         if name_of(answer) != name_of(command):
             edge.append(len(asked[tuple(bins)]) > 1)

@@ -59,8 +59,8 @@ def test_unseen_samples_are_those_whose_bins_no_demonstration_met() -> None:
     home, narrow = rows
     space = presets.space(config["vsa"], {p: config["corral"]["options"][p][c] for p, c in (
         ("encoder", "level"), ("protection", "none"), ("record", "bind"))}, 0)  # fmt: skip
-    met = {tuple(row) for row in space.bins(READINGS[100:]).tolist()}
-    unseen = [tuple(row) not in met for row in space.bins(new).tolist()]
+    met = {tuple(row) for row in space.cells(READINGS[100:]).tolist()}
+    unseen = [tuple(row) not in met for row in space.cells(new).tolist()]
     assert home["unseen_share"] == pytest.approx(np.mean(unseen))
     assert 0 < np.mean(unseen) < 1
     assert home["conditions"] == len(met)

@@ -23,7 +23,7 @@ def test_the_weights_are_needed() -> None:
     behaviour = hand_written.behaviour(torchvsa.MAP(4000, dtype=torch.int8), 0)
     space = behaviour.space
     conditions = space.encode(torch.tensor([condition for condition, _ in hand_written.RULES]))
-    results = space.results(
+    results = space.items(
         space.schema.command_levels(
             sim.Teacher()(np.array([[0.5, 0.5, 0.9], [0.5, 5, 0.9], [5, 0.5, 0.9], [5, 5, 0.1], [5, 5, 0.9]]))
         )

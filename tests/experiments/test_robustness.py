@@ -122,7 +122,7 @@ def test_heavy_damage_is_felt(part: str) -> None:
 def test_flipping_all_of_the_program_or_the_query_turns_the_order_of_the_results_around(part: str) -> None:
     one = learner("default")
     assert isinstance(one, Programmed)
-    bins = one.space.bins(READINGS)
+    bins = one.space.cells(READINGS)
     scores = torch.stack(
         [one.space.encode(bins).double() @ (one.behaviour.program * item).double() for item in one.items], -1
     )
@@ -148,7 +148,7 @@ def test_the_codebooks_of_others_stay_whole_and_missing_readings_keep_their_entr
 def test_each_condition_is_damaged_in_its_own_way() -> None:
     one = learner("default")
     assert isinstance(one, Programmed)
-    bins = one.space.bins(READINGS)
+    bins = one.space.cells(READINGS)
     query = one.damaged("query", damage("flip", 0.45))
     # Asked in another order and company, each condition gets the same answer.
     assert np.array_equal(query.results(bins).tolist(), query.results(bins.flip(0))[::-1].tolist())

@@ -66,19 +66,8 @@ HOSTILE: list[Any] = [
         [[]],
     ),
     *("MAP-I", "HRR", "BSC", "FHRR", "int8", "float16", "bfloat16", "float64", "complex64", "bool", "load", "C", "B"),
-    *(
-        "product",
-        "sum",
-        "subset_product",
-        "threshold_features",
-        "history",
-        "level",
-        "lookup",
-        "balanced",
-        "self_shift",
-        "fixed_shift",
-        "none",
-    ),
+    *("product", "sum", "subset_product", "threshold_features", "history", "level", "lookup", "balanced"),
+    *("self_shift", "fixed_shift", "none"),
     *({"name": "none"}, "mean", "sum", "clip", "error", "random_fourier", "circular", "uniform", "bipolar"),
 ]
 _EDGES = [torch.tensor([0.2, 0.5]), torch.tensor([0.1, 0.1, 0.9])]

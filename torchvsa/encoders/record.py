@@ -59,9 +59,9 @@ class Record(Encoder):
 
     @property
     def _values(self) -> list[ValueEncoder]:
-        """The value encoder of each sensor."""
+        """The value encoder of all sensors, or those of each."""
         values: Any = list(self.values)
-        return values * self.sensors if self.shared else values
+        return values
 
     @property
     def value(self) -> ValueEncoder:
@@ -95,7 +95,7 @@ class Record(Encoder):
 
     def config(self) -> dict[str, Any]:
         """See `Part.config`."""
-        values: Any = [value.config() for value in self._values]
+        values = [value.config() for value in self._values]
         return {"name": self.name, "values": values[0] if self.shared else values, "sensors": self.sensors}
 
     @classmethod
@@ -124,7 +124,8 @@ class Record(Encoder):
 
     def _encode(self, cells: Shaped[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         observed = cells >= 0
-        codes = [self._code(*pair) for pair in zip(self._values, cells.clamp(min=0).unbind(1), strict=True)]
+        values = self._values * (self.sensors if self.shared else 1)
+        codes = [self._code(*pair) for pair in zip(values, cells.clamp(min=0).unbind(1), strict=True)]
         bound = self._bound(self.roles[:, None], torch.stack(codes))
         return self._combine(bound.movedim(0, 1), observed)
 
