@@ -8,7 +8,7 @@ from torch import nn
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import OneShot, Rule
+from behaviours.learning import Gradient, Rule
 from behaviours.progress import Progress, silent
 from behaviours.report import LearningReport
 from behaviours.space import Space
@@ -31,13 +31,13 @@ class BehaviourBank(nn.Module):
     def learn(
         self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = silent
     ) -> LearningReport:
-        """Learn a behaviour (with `OneShot()`, if no rule is given) and keep it under `name`.
+        """Learn a behaviour (with `Gradient()`, if no rule is given) and keep it under `name`.
 
         An existing behaviour of that name is replaced. Says what the rule did with the samples; `progress` is called
         with the share of the work that is done.
         """
         check_name(name)
-        behaviour = (rule or OneShot()).fit(self.space, demonstrations, progress)
+        behaviour = (rule or Gradient()).fit(self.space, demonstrations, progress)
         self.add(name, behaviour)
         return behaviour.report
 

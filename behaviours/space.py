@@ -13,13 +13,15 @@ from behaviours.schema import Schema
 from behaviours.storage import Layout, check_layout, naming
 from torchvsa import MAP, VSA, Part, Protection, Unprotected
 from torchvsa._checks import whole_number
-from torchvsa.encoders import Encoder, Lookup, Record, Sum, ThresholdFeatures, ValueEncoder
+from torchvsa.encoders import Balanced, Encoder, Record, Sum, ThresholdFeatures, ValueEncoder
 
 
 class Space(nn.Module):
     """Encode readings as conditions and commands as results, with one set of random codebooks.
 
-    Give an `encoder` (which holds its architecture), or a `vsa` on which the default encoder is made, or neither.
+    Give an `encoder` (which holds its architecture), or a `vsa` on which the default encoder is made, or neither. By
+    default conditions are 4,000 integers that each ask about one or two sensors (`ThresholdFeatures`), unprotected,
+    and the levels of the actuators have `Balanced` codes: what did best on robots for which nothing was tuned.
     `command_codes` encodes the levels of the actuators. Parts that are plans, without codebooks of their own, are
     copied and drawn from `seed`: encoder first, then the codes of commands, then the protection. The same seed draws
     the same codebooks.
@@ -44,7 +46,7 @@ class Space(nn.Module):
         sensors, actuators = len(schema.sensors), schema.actuators
         if encoder is None:
             vsa = vsa or MAP(dim=4000, dtype=torch.int8)
-            encoder = ThresholdFeatures(vsa, sensors)
+            encoder = ThresholdFeatures(vsa, sensors, bins=256, subset=2)
         elif vsa is not None and vsa != encoder.vsa:
             raise ValueError(f"the encoder works on {encoder.vsa}, which is not the given {vsa}; give one of them")
         if encoder.sensors != sensors:
@@ -53,7 +55,7 @@ class Space(nn.Module):
             schema.check_bins(encoder.bins)
         self.vsa = encoder.vsa
         most = max(actuator.levels for actuator in actuators)
-        results = Sum(command_codes or Lookup(self.vsa, most), sensors=len(actuators))
+        results = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
         if results.bins != most:
             raise ValueError(f"the codes of commands are for {results.bins} levels; the schema has {most}")
         protection = protection or Unprotected(self.vsa)

@@ -9,14 +9,14 @@ import torch
 from robots import random_pairs, same_bits, space
 from torch import Tensor
 
-from behaviours import POLICIES, BehaviourBank, Recall, Space
+from behaviours import POLICIES, BehaviourBank, OneShot, Recall, Space
 
 
 def minds(made: Space) -> dict[str, Callable[[Any], Recall]]:
     bank = BehaviourBank(made)
     shown = random_pairs(12)
-    bank.learn("low", shown.where([row < 6 for row in range(12)]))
-    bank.learn("high", shown.where([row >= 6 for row in range(12)]))
+    bank.learn("low", shown.where([row < 6 for row in range(12)]), OneShot())
+    bank.learn("high", shown.where([row >= 6 for row in range(12)]), OneShot())
     return {"low": bank["low"], **{name: cast(Any, policy)(bank) for name, policy in POLICIES.items()}}
 
 

@@ -309,8 +309,8 @@ def check_policies(policy: Callable[[BehaviourBank], Policy], path: Path) -> Non
 
     banks = [BehaviourBank(s) for s in spaces("MAP-C")]
     for bank in banks:
-        bank.learn("low", SHOWN.where([row < 20 for row in range(40)]))
-        bank.learn("high", SHOWN.where([row >= 20 for row in range(40)]))
+        bank.learn("low", SHOWN.where([row < 20 for row in range(40)]), OneShot())
+        bank.learn("high", SHOWN.where([row >= 20 for row in range(40)]), OneShot())
     here, away = (policy(bank) for bank in banks)
     answers_alike(here, away)
     answers_alike(here, moved(here))

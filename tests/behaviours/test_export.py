@@ -70,7 +70,7 @@ def compiled(function: Any, backend: str = "aot_eager") -> Callable[..., Any]:
 
 def policies() -> list[nn.Module]:
     bank = BehaviourBank(space(256))
-    bank.learn("seek", random_pairs(12))
+    bank.learn("seek", random_pairs(12), OneShot())
     bank.learn("avoid", random_pairs(9, seed=3), ErrorDriven())
     return [Bundle(bank), Priority(bank, ["avoid", "seek"])]
 

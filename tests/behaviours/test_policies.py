@@ -24,7 +24,7 @@ def three(dim: int = 1000, vsa: str = "MAP-C", each: int = 8) -> tuple[Behaviour
     shown = random_pairs(3 * each)
     for i, name in enumerate(NAMES):
         pairs[name] = shown.where([each * i <= row < each * (i + 1) for row in range(len(shown))])
-        bank.learn(name, pairs[name])
+        bank.learn(name, pairs[name], OneShot())
     return bank, pairs
 
 
@@ -117,7 +117,7 @@ def test_a_bundle_recalls_all_of_its_parts_as_one_behaviour(vsa: str) -> None:
 def test_one_behaviour_alone_is_that_behaviour(policy: type[Bundle | Priority]) -> None:
     bank = BehaviourBank(space(500))
     shown = random_pairs(9)
-    bank.learn("only", shown)
+    bank.learn("only", shown, OneShot())
     recall = policy(bank)(shown.sensors)
     assert same_answer(recall, bank["only"](shown.sensors))
     assert recall.speaker is not None
@@ -181,7 +181,7 @@ def test_priority_lets_each_speak_where_it_knows() -> None:
 
 def test_where_two_know_the_first_in_order_speaks() -> None:
     bank = BehaviourBank(space(1000))
-    bank.learn("go", Demonstrations([[1.0, 1, 1]], [[1.0, 1]]))
+    bank.learn("go", Demonstrations([[1.0, 1, 1]], [[1.0, 1]]), OneShot())
     bank.learn("stop", Demonstrations([[1.0, 1, 1]], [[0.0, 0]]), ErrorDriven())
     for order in (["go", "stop"], ["stop", "go"]):
         recall = Priority(bank, order)([[1.0, 1, 1]])
@@ -190,8 +190,8 @@ def test_where_two_know_the_first_in_order_speaks() -> None:
 
 def test_weights_decide_between_contradicting_behaviours() -> None:
     bank = BehaviourBank(space(1000))
-    bank.learn("go", Demonstrations([[1.0, 1, 1]], [[1.0, 1]]))
-    bank.learn("stop", Demonstrations([[1.0, 1, 1]], [[0.0, 0]]))
+    bank.learn("go", Demonstrations([[1.0, 1, 1]], [[1.0, 1]]), OneShot())
+    bank.learn("stop", Demonstrations([[1.0, 1, 1]], [[0.0, 0]]), OneShot())
     for weight, speaker in ((0.5, 0), (2.0, 1)):
         recall = Bundle(bank, {"stop": weight})([[1.0, 1, 1]])
         assert recall.speaker is not None
@@ -201,7 +201,7 @@ def test_weights_decide_between_contradicting_behaviours() -> None:
 
 def test_the_bank_replaces_names_and_refuses_strangers() -> None:
     bank = BehaviourBank(space(128))
-    bank.learn("a", random_pairs(3))
+    bank.learn("a", random_pairs(3), OneShot())
     report = bank.learn("a", random_pairs(5), OneShot())
     assert (bank.names, len(bank), report.new, "a" in bank, "b" in bank) == (["a"], 1, 5, True, False)
     with pytest.raises(KeyError, match="no behaviour 'b' in this bank; it holds a"):

@@ -8,7 +8,7 @@ import pytest
 import torch
 from robots import random_pairs, same_bits, space
 
-from behaviours import POLICIES, BehaviourBank, Policy, Recall
+from behaviours import POLICIES, BehaviourBank, OneShot, Policy, Recall
 from torchvsa import ARCHITECTURES
 
 Make = Callable[[BehaviourBank], Policy]
@@ -20,8 +20,8 @@ architectures = pytest.mark.parametrize("vsa", ARCHITECTURES)
 def bank(vsa: str = "MAP-C", dim: int = 2000) -> BehaviourBank:
     made = BehaviourBank(space(dim, vsa, protection={"name": "self_shift", "width": "sum"}))
     shown = random_pairs(12)
-    made.learn("low", shown.where([row < 6 for row in range(12)]))
-    made.learn("high", shown.where([row >= 6 for row in range(12)]))
+    made.learn("low", shown.where([row < 6 for row in range(12)]), OneShot())
+    made.learn("high", shown.where([row >= 6 for row in range(12)]), OneShot())
     return made
 
 

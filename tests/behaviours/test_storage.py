@@ -308,7 +308,7 @@ def test_the_same_content_gives_the_same_bytes(tmp_path: Path) -> None:
 def test_a_bank_over_a_space_with_memory_comes_back(tmp_path: Path) -> None:
     vsa = torchvsa.MAP(128, dtype=torch.int8)
     made = BehaviourBank(Space(SCHEMA, History(encoder(vsa), [1, 3]), protection=torchvsa.SelfShift(vsa)))
-    made.learn("seek", random_pairs(9))
+    made.learn("seek", random_pairs(9), OneShot())
     again = BehaviourBank.load(made.save(tmp_path / "bank"))
     assert isinstance(again.space.encoder, History)
     assert again.space.same_as(made.space)

@@ -23,8 +23,8 @@ def ten_lines() -> str:
 def test_ten_lines_teach_what_one_superposition_does_not_hold(tmp_path: Path) -> None:
     shown = random_pairs(300)
     bank = BehaviourBank(space(2000, protection={"name": "self_shift", "width": "sum"}))
-    bank.learn("seek_light", shown)
-    bank.learn("avoid", random_pairs(5, seed=1))
+    bank.learn("seek_light", shown, OneShot())
+    bank.learn("avoid", random_pairs(5, seed=1), OneShot())
     before = bank["seek_light"]
     assert correct(before, shown).mean() < 0.9
     names = {"bank": bank, "shown": shown, "torch": torch}

@@ -27,7 +27,7 @@ def assert_refused(run: CompletedProcess[str], words: str, folder: Path) -> None
         ("controllers=[teacher,nobody]", "'nobody'"),
         ("vsa.name=MAP-X", "'MAP-X'"),
         ("vsa.dim=0", "dim"),
-        ("encoder.bins=0", "level"),
+        ("encoder.bins=0", "bins"),
         ("encoder.nonsense=3", "nonsense"),
         ("arena.preset=nowhere", "'nowhere'"),
         ("body.name=legged", "legged"),
