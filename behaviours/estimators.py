@@ -16,7 +16,7 @@ from torch import Tensor
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient
+from behaviours.learning import Gradient, no_convergence_warnings
 from behaviours.learning.least_squares import solve
 from behaviours.recall import scores
 from behaviours.report import LearningReport
@@ -111,6 +111,7 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
         self.learning_rate = learning_rate
         self.random_state = random_state
 
+    @no_convergence_warnings()
     def fit(self, X: Any, y: Any) -> Self:  # noqa: N803 (scikit-learn's own name)
         """Train the program on rows `X` `[N, n]` and labels `y` `[N]`.
 
@@ -126,6 +127,7 @@ class BehaviourClassifier(ClassifierMixin, _Encoding):
         self.behaviour_ = self._rule(space.seed).fit(space, shown)
         return self
 
+    @no_convergence_warnings()
     def partial_fit(self, X: Any, y: Any, classes: Any = None) -> Self:  # noqa: N803
         """Go on training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
 
