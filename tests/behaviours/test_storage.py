@@ -17,6 +17,7 @@ from safetensors.torch import load, save_file
 
 from behaviours import BehaviourBank, Demonstrations, ErrorDriven, OneShot
 from behaviours import storage as module
+from behaviours.learning import no_convergence_warnings
 from torchvsa import ARCHITECTURES
 
 
@@ -27,7 +28,8 @@ def real(tensor: torch.Tensor) -> torch.Tensor:
 def bank(vsa: str = "MAP-C", protection: Any = "self_shift", **encoder: Any) -> BehaviourBank:
     made = BehaviourBank(space(128, vsa, protection=protection, seed=3, **encoder))
     made.learn("seek light", random_pairs(9), OneShot("similarity", clip_each_step=True))
-    made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(passes=2))
+    with no_convergence_warnings():
+        made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(passes=2))
     return made
 
 
