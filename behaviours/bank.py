@@ -8,7 +8,7 @@ from torch import nn
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient, Rule
+from behaviours.learning import Gradient, Rule, check_rule
 from behaviours.progress import Progress, silent
 from behaviours.report import LearningReport
 from behaviours.space import Space
@@ -37,18 +37,24 @@ class BehaviourBank(nn.Module):
         with the share of the work that is done.
         """
         check_name(name)
-        behaviour = (rule or Gradient()).fit(self.space, demonstrations, progress)
+        rule = Gradient() if rule is None else rule
+        check_rule(rule)
+        behaviour = rule.fit(self.space, demonstrations, progress)
         self.add(name, behaviour)
         return behaviour.report
 
-    def partial_fit(self, name: str, demonstrations: Demonstrations, rule: Rule) -> LearningReport:
+    def partial_fit(
+        self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = silent
+    ) -> LearningReport:
         """Go on learning the behaviour `name` from a further piece of demonstration, or begin it with its first.
 
-        Says what became of all pieces so far. Raises `ValueError` for rules that cannot, see `Rule.partial_fit`.
+        Says what became of all pieces so far. `progress` is called with the share of the work that is done. Raises
+        `ValueError` for rules that cannot go on, see `Rule.partial_fit`.
         """
+        check_rule(rule)
         if name not in self:
-            return self.learn(name, demonstrations, rule)
-        behaviour = rule.partial_fit(self[name], demonstrations)
+            return self.learn(name, demonstrations, rule, progress)
+        behaviour = rule.partial_fit(self[name], demonstrations, progress)
         self.add(name, behaviour)
         return behaviour.report
 

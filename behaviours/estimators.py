@@ -18,7 +18,7 @@ from torch import Tensor
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient
+from behaviours.learning import Gradient, no_convergence_warnings
 from behaviours.learning.least_squares import solve
 from behaviours.progress import between
 from behaviours.quantiles import QuantileEncoding
@@ -74,6 +74,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         self.random_state = random_state
         self.verbose = verbose
 
+    @no_convergence_warnings()
     def fit(self, X: Any, y: Any) -> Self:  # noqa: N803 (scikit-learn's own name)
         """Train the program on rows `X` `[N, n]` and labels `y` `[N]`.
 
@@ -94,6 +95,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
             self.behaviour_ = self._trained(lambda: self._rule(space.seed).fit(space, shown, self._progress()))
         return self
 
+    @no_convergence_warnings()
     def partial_fit(self, X: Any, y: Any, classes: Any = None) -> Self:  # noqa: N803
         """Go on training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
 

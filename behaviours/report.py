@@ -2,10 +2,15 @@
 
 from dataclasses import asdict, dataclass
 
+from behaviours.options import store, whole
+
 
 @dataclass(frozen=True)
 class LearningReport:
-    """Counts of the samples of one demonstration, by what the rule decided about them."""
+    """Counts of the samples of one demonstration, by what the rule decided about them.
+
+    Raises `ValueError` unless `rule` is a string and every count a whole number from 0 on.
+    """
 
     rule: str
     samples: int
@@ -27,6 +32,12 @@ class LearningReport:
     """Pairs that a trained program still recalls wrongly, or below the margin asked for."""
     presumed_known: int = 0
     """Samples taken as known for their likeness to earlier pieces: truly or falsely, nobody remembers."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.rule, str):
+            raise ValueError(f"the rule of a report is the name of one; got {self.rule!r}")
+        counts = {name: value for name, value in vars(self).items() if name != "rule"}
+        store(self, **{name: whole(name, value, 0) for name, value in counts.items()})
 
     @property
     def pairs(self) -> int:

@@ -11,6 +11,7 @@ import torch
 from numpy.typing import NDArray
 
 from behaviours import Demonstrations, OneShot, Rule, Space
+from behaviours.learning import no_convergence_warnings
 from behaviours.ordered import distinct_rows
 from experiments import presets
 
@@ -94,7 +95,8 @@ def recalled(rules: Mapping[str, tuple[Space, Rule]], shown: Demonstrations) -> 
     wanted[pairs[:, 0]] = pairs[:, 1]
     right = {}
     for name, (space, rule) in rules.items():
-        behaviour = rule.fit(space, shown)
+        with no_convergence_warnings():  # the recall says it
+            behaviour = rule.fit(space, shown)
         asked = space.encode(conditions[single])
         answers = torch.cat([behaviour.ask(block).commands for block in asked.split(1024)])
         match = space.schema.command_levels(answers) == results[wanted[single]]

@@ -21,6 +21,7 @@ from sklearn.tree import DecisionTreeClassifier
 
 import sim
 from behaviours import Demonstrations, Space
+from behaviours.learning import no_convergence_warnings
 from behaviours.ordered import distinct_rows
 from experiments import presets
 from experiments.agreement import right
@@ -186,7 +187,8 @@ def learn_and_ask(
     default = Combination.default(own)
     if isinstance(learner, Combination):
         space = _space(own, config["vsa"], learner, seed)
-        policy = Recalled(presets.rule(own["options"]["rule"][learner.rule]).fit(space, shown))
+        with no_convergence_warnings():  # the agreement says it
+            policy = Recalled(presets.rule(own["options"]["rule"][learner.rule]).fit(space, shown))
         changed = learner.changes(default)
     else:
         space = _space(own, config["vsa"], default, seed)

@@ -9,6 +9,7 @@ import numpy as np
 
 import torchvsa
 from behaviours import Actuator, Behaviour, Demonstrations, Rule, Schema, Sensor, Space
+from behaviours.learning import no_convergence_warnings
 from experiments import presets
 from torchvsa import recall_probability
 
@@ -75,7 +76,8 @@ def measure(config: Mapping[str, Any], learner: str, dim: int, repeat: int) -> t
     def recall(count: int) -> float:
         shown = random_pairs(count, seed)
         began = time.perf_counter()
-        behaviour = rule.fit(codebooks, shown)
+        with no_convergence_warnings():  # the recall says it
+            behaviour = rule.fit(codebooks, shown)
         seconds = time.perf_counter() - began
         share = recalled(behaviour, shown)
         report = behaviour.report

@@ -26,9 +26,11 @@ class Priority(Policy):
         order: Sequence[str] | None = None,
         thresholds: Mapping[str, float] | None = None,
     ) -> None:
+        if isinstance(order, str):
+            raise TypeError(f"order is a list of names, the first to be asked first; write [{order!r}] for {order!r}")
         super().__init__(bank, bank.names if order is None else list(order))
         calibrated = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
-        self.thresholds = self.per_behaviour(thresholds, calibrated, "thresholds").tolist()
+        self.thresholds = self.per_behaviour(thresholds, calibrated, "thresholds")
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """See `Policy.ask`."""

@@ -32,15 +32,20 @@ class Rule(ABC):
     def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> "Behaviour":
         """Learn one program from the demonstration. Raises for readings or commands that are not valid.
 
-        `progress` is called with the share of the work that is done, see `behaviours.progress`.
+        `progress` is called with the share of the work that is done, see `behaviours.progress`. Rules that train warn
+        with `ConvergenceWarning` if the program recalls some conditions wrongly; of a condition that was shown with
+        several results only the one that it was trained to counts, or any of the most frequent ones.
         """
 
-    def partial_fit(self, behaviour: "Behaviour", demonstrations: Demonstrations) -> "Behaviour":
+    def partial_fit(
+        self, behaviour: "Behaviour", demonstrations: Demonstrations, progress: Progress = silent
+    ) -> "Behaviour":
         """Go on learning: what becomes of `behaviour`, whichever rule it is from, when this is shown as well.
 
         Of earlier demonstrations only the behaviour is left: its program, known conditions and clean-up memory. New
         results are appended to the memory in order of first insertion. Contradictions are settled within the piece,
         and the report counts a condition as new in each piece that stores it. `behaviour` itself stays as it is.
+        `progress` and `ConvergenceWarning`, which looks at this piece alone, are as in `fit`.
 
         Raises `ValueError` where a rule, or an option of it, needs more than that.
         """

@@ -61,6 +61,7 @@ def encode_distinct(
     distinct, condition = distinct_rows(cells)
     if len(distinct) * space.vsa.row_bytes <= HELD_BYTES:
         encoded, merged = distinct_rows(space.encode(distinct))
+        progress(1.0)
         return encoded, merged[condition]
     first, merged = _merged(space, distinct, progress)
     return Conditions(space, distinct if len(first) == len(distinct) else distinct[first]), merged[condition]

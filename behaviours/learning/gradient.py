@@ -12,8 +12,10 @@ from torch.nn import functional
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule, grown
+from behaviours.learning.convergence import warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
-from behaviours.progress import Progress, silent
+from behaviours.options import flag, number, store, whole
+from behaviours.progress import Progress, between, silent
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa.exact import dots, norms, signed
@@ -73,20 +75,24 @@ class Gradient(Rule):
         for field, options in (("loss", Loss), ("output", Output)):
             if getattr(self, field) not in get_args(options):
                 raise ValueError(f"{field} is one of {', '.join(get_args(options))}; got {getattr(self, field)!r}")
-        if min(self.passes, self.batch, self.patience) < 1:
-            raise ValueError(
-                f"passes, batch and patience are at least 1; got {self.passes}, {self.batch}, {self.patience}"
-            )
-        if not (self.learning_rate > 0 and 0 <= self.held_back < 1):
-            raise ValueError(
-                f"learning_rate is above 0 and held_back a share in [0, 1); got {self.learning_rate}, {self.held_back}"
-            )
+        store(
+            self,
+            passes=whole("passes", self.passes, 1),
+            batch=whole("batch", self.batch, 1),
+            learning_rate=number("learning_rate", self.learning_rate, 0, above=True, below=_FASTEST),
+            sparse=flag("sparse", self.sparse),
+            held_back=number("held_back", self.held_back, 0, below=1),
+            patience=whole("patience", self.patience, 1),
+            seed=whole("seed", self.seed, *_SEEDS),
+        )
 
     def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
         """See `Rule.fit`. Raises `ValueError` if the share held back leaves no condition on one of both sides."""
-        return self._learn(space, Samples.of(space, demonstrations), progress=progress)
+        return self._learn(space, demonstrations, None, progress)
 
-    def partial_fit(self, behaviour: Behaviour, demonstrations: Demonstrations) -> Behaviour:
+    def partial_fit(
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+    ) -> Behaviour:
         """See `Rule.partial_fit`: descend from the program at hand, with a new optimiser and a new schedule.
 
         Nothing holds an earlier piece in place but the program's own inertia: take few passes or a low learning rate.
@@ -97,26 +103,49 @@ class Gradient(Rule):
                 f"a program rounded to {self.output!r} no longer holds what small steps add up to; go on with "
                 "output='float'"
             )
-        samples = Samples.of(behaviour.space, demonstrations).after(behaviour.results)
-        return self._learn(behaviour.space, samples, behaviour)
+        return self._learn(behaviour.space, demonstrations, behaviour, progress)
 
     def _learn(
-        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = silent
+        self, space: Space, demonstrations: Demonstrations, before: Behaviour | None, progress: Progress
     ) -> Behaviour:
+        # Callers may have turned gradients off, and tensors made in inference mode could not take part in any.
+        with torch.inference_mode(False), torch.enable_grad():
+            return self._descend(space, demonstrations, before, progress)
+
+    def _descend(
+        self, space: Space, demonstrations: Demonstrations, before: Behaviour | None, progress: Progress
+    ) -> Behaviour:
+        shown = Samples.of(space, demonstrations, between(progress, 0, 0.1))
+        if before is not None:
+            shown = shown.after(before.results)
         aims = shown.targets("first" if self.contradictions == "all" else self.contradictions)
         samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
         items = space.items(samples.results)
         generator = torch.Generator().manual_seed(self.seed)
         train, held = self._split(samples, generator)
         training = _Training(self, space.vsa, samples, items, before)
-        program, passes, updates = training.run(train, held, generator, progress)
+        program, passes, updates = training.run(train, held, generator, between(progress, 0.1, 1))
+        if not program.isfinite().all():
+            raise ValueError(f"learning_rate={self.learning_rate:g} drove the program to infinity; take a lower one")
+        answers = training.answers(program)
         progress(1.0)
         report = samples.report(
             self.name,
             contradicting=int((aims[shown.condition] != shown.result).sum()),
             passes=passes,
             updates=updates,
-            wrong=training.wrong(program, torch.arange(len(samples.condition))),
+            wrong=int((answers[samples.condition] != samples.result).sum()),
+        )
+        # Conditions held back were not trained on.
+        trained = samples.condition[train].unique()
+        warn_if_wrong(
+            type(self).__name__,
+            int(samples.missed(answers)[trained].sum()),
+            len(trained),
+            contradicting=report.contradicting,
+            samples=report.samples,
+            after=f" after {passes} passes",
+            remedy="more dimensions (dim), more passes or another learning_rate",
         )
         return grown(before, Behaviour(space, program, samples.known(space.vsa), samples.results, report))
 
@@ -181,9 +210,13 @@ class _Training:
         return torch.view_as_complex(rounded) if self.complex else rounded
 
     def scores(self, program: Shaped[Tensor, "d"], rows: Int64[Tensor, "batch"]) -> Float[Tensor, "batch r"]:
-        """What recall compares; `<c ⊗ p, r> = <c, p ⊗ r>`, so the program is folded into the results."""
+        """What recall compares, for samples."""
+        return self._recall(program, self.samples.condition[rows])
+
+    def _recall(self, program: Shaped[Tensor, "d"], which: Int64[Tensor, "batch"]) -> Float[Tensor, "batch r"]:
+        """The same for conditions; `<c ⊗ p, r> = <c, p ⊗ r>`, so the program is folded into the results."""
         # Whole rows are copied far faster by index_select than by an index.
-        conditions = self.samples.conditions.index_select(0, self.samples.condition[rows])
+        conditions = self.samples.conditions.index_select(0, which)
         answers = dots(conditions, self.vsa.unbind(program, self.items))
         return answers / self.lengths.to(answers.dtype)
 
@@ -204,6 +237,12 @@ class _Training:
         """How many samples recall another result than their own."""
         parts = [self.scores(program, part).argmax(1) != self.samples.result[part] for part in rows.split(1024)]
         return sum(int(part.sum()) for part in parts)
+
+    @torch.no_grad()
+    def answers(self, program: Shaped[Tensor, "d"]) -> Int64[Tensor, "k"]:
+        """The result that each condition recalls."""
+        conditions = torch.arange(len(self.samples.conditions), device=self.items.device)
+        return torch.cat([self._recall(program, part).argmax(1) for part in conditions.split(1024)])
 
     def run(
         self, train: Tensor, held: Tensor, generator: torch.Generator, progress: Progress
@@ -227,6 +266,8 @@ class _Training:
                     with torch.no_grad():
                         self.parameters.clamp_(min=_FLOOR)
                 step += 1
+                if step % _TOLD == 0:
+                    progress(step / (per_pass * rule.passes))
             progress(sweep / rule.passes)
             now = self.floats().detach()
             if not len(held):
@@ -241,6 +282,15 @@ class _Training:
         answer = best if len(held) else (total / averaged).to(best.dtype)
         return self.program(answer, scaled=False), sweep, step
 
+
+_SEEDS = -(2**63), 2**64 - 1
+"""What `torch.Generator` takes."""
+
+_FASTEST = 1e30
+"""Learning rates stay below it, since steps of more do not fit into float32."""
+
+_TOLD = 64
+"""Steps between two reports of progress within a pass."""
 
 _ROOT = 0.1
 """Where the roots of a sparse program start: programs of 0.01, small beside those learned."""

@@ -10,8 +10,10 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
+from behaviours.learning.convergence import warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
-from behaviours.progress import Progress, silent
+from behaviours.options import number, store
+from behaviours.progress import Progress, between, silent
 from behaviours.recall import scores
 from behaviours.space import Space
 from torchvsa import VSA
@@ -40,8 +42,7 @@ class LeastSquares(Rule):
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions, "all")
-        if not self.ridge > 0:
-            raise ValueError(f"ridge must be above 0; got {self.ridge}")
+        store(self, ridge=number("ridge", self.ridge, 0, above=True))
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
@@ -50,7 +51,7 @@ class LeastSquares(Rule):
 
     def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
         """See `Rule.fit`."""
-        shown = Samples.of(space, demonstrations)
+        shown = Samples.of(space, demonstrations, between(progress, 0, 0.2))
         samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
         shape = len(samples.conditions), len(samples.results)
         cells = samples.condition * shape[1] + samples.result
@@ -58,7 +59,7 @@ class LeastSquares(Rule):
         items = space.items(samples.results)
         targets = counts / counts.sum(1, keepdim=True)
         conditions = samples.conditions[:]
-        program = solve(space.vsa, conditions, items, targets, self.ridge)
+        program = solve(space.vsa, conditions, items, targets, self.ridge, between(progress, 0.2, 0.9))
         said = scores(space.vsa, program, conditions, items, norms(items)).argmax(1)
         report = samples.report(
             self.name,
@@ -66,9 +67,20 @@ class LeastSquares(Rule):
             wrong=int((said != counts.argmax(1)).sum()),
         )
         progress(1.0)
+        warn_if_wrong(
+            type(self).__name__,
+            int(samples.missed(said).sum()),
+            len(counts),
+            contradicting=report.contradicting,
+            samples=report.samples,
+            after="",
+            remedy="more dimensions (dim) or a smaller ridge",
+        )
         return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
 
-    def partial_fit(self, behaviour: Behaviour, demonstrations: Demonstrations) -> Behaviour:
+    def partial_fit(
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+    ) -> Behaviour:
         """Raises `ValueError`: the solution alone cannot go on."""
         raise ValueError(
             "least squares cannot go on from a program: a further pair also needs the inverse covariance of all pairs "
@@ -83,13 +95,18 @@ def solve(
     items: Shaped[Tensor, "r d"],
     targets: Float64[Tensor, "k r"],
     ridge: float,
+    progress: Progress = silent,
 ) -> Float[Tensor, "d"]:
     """The program p that minimises the sum over k and r of (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
 
     `s` is the mean squared length of a pair c ⊗ r. With k·r pairs the system has k·r unknowns in the dual and d in the
-    primal form, and the smaller one is solved, in float64. Raises `ValueError` for architectures without
-    element-wise binding of real numbers.
+    primal form, and the smaller one is solved, in float64. `progress` is called with the share of the work that is
+    done.
+
+    Raises `ValueError` for architectures without element-wise binding of real numbers, and for a `ridge` that is not
+    above 0, or too small to solve the system.
     """
+    ridge = number("ridge", ridge, 0, above=True)
     if not LeastSquares.supports(vsa):
         raise ValueError(
             f"least squares needs a bind of real numbers, element by element, which {vsa.name} lacks; "
@@ -104,15 +121,21 @@ def solve(
         rows = (c[:, None] * r).flatten(0, 1)
         system = (rows @ rows.T).double()
         system.diagonal().add_(weight)
-        program = rows.double().T @ _positive(system, targets.reshape(-1))
+        progress(0.4)
+        program = rows.double().T @ _positive(system, targets.reshape(-1), ridge)
     else:
         # Element-wise binding makes the d × d matrix of all pairs a product of two small ones.
         system = ((c.T @ c) * (r.T @ r)).double()
         system.diagonal().add_(weight)
-        program = _positive(system, (c.double() * (targets @ r.double())).sum(0))
+        progress(0.4)
+        program = _positive(system, (c.double() * (targets @ r.double())).sum(0), ridge)
+    progress(1.0)
     return program.to(torch.float64 if vsa.dtype == torch.float64 else torch.float32)
 
 
-def _positive(system: Float64[Tensor, "n n"], target: Float64[Tensor, "n"]) -> Float64[Tensor, "n"]:
-    """Solve a positive definite system."""
-    return torch.cholesky_solve(target[:, None], torch.linalg.cholesky(system))[:, 0]
+def _positive(system: Float64[Tensor, "n n"], target: Float64[Tensor, "n"], ridge: float) -> Float64[Tensor, "n"]:
+    """Solve a system that is positive definite unless the ridge is lost in rounding."""
+    factor, failed = torch.linalg.cholesky_ex(system)
+    if failed:
+        raise ValueError(f"ridge={ridge:g} is too small: the system cannot be solved in float64; take a larger one")
+    return torch.cholesky_solve(target[:, None], factor)[:, 0]

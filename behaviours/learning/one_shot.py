@@ -11,6 +11,7 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.learning.sums import Sums
+from behaviours.options import flag, number, store
 from behaviours.ordered import first_rows, in_order_of_appearance
 from behaviours.progress import Progress, between, silent
 from behaviours.report import LearningReport
@@ -49,13 +50,18 @@ class OneShot(Rule):
         check_contradictions(self.contradictions)
         if self.known not in ("equality", "similarity"):
             raise ValueError(f"known is decided by 'equality' or 'similarity'; got {self.known!r}")
+        store(self, sigmas=number("sigmas", self.sigmas), clip_each_step=flag("clip_each_step", self.clip_each_step))
+        if self.threshold is not None:
+            store(self, threshold=number("threshold", self.threshold))
 
     def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
         """See `Rule.fit`: the same bits as the loop over the samples, one by one."""
         samples = Samples.of(space, demonstrations, between(progress, 0, 0.5))
         return self._learn(space, samples, progress=between(progress, 0.5, 1))
 
-    def partial_fit(self, behaviour: Behaviour, demonstrations: Demonstrations) -> Behaviour:
+    def partial_fit(
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+    ) -> Behaviour:
         """See `Rule.partial_fit`: with contradictions settled by the first, the same bits as `fit` on all at once.
 
         Raises `ValueError` for `known="equality"`, and if a program that was never clipped shall be clipped now.
@@ -72,8 +78,8 @@ class OneShot(Rule):
                 f"clip_each_step goes on from programs of {clipped}; this one is a sum in "
                 f"{behaviour.program.dtype}, so go on from behaviour.clipped()"
             )
-        samples = Samples.of(behaviour.space, demonstrations).after(behaviour.results)
-        return self._learn(behaviour.space, samples, behaviour)
+        samples = Samples.of(behaviour.space, demonstrations, between(progress, 0, 0.5)).after(behaviour.results)
+        return self._learn(behaviour.space, samples, behaviour, between(progress, 0.5, 1))
 
     def _learn(
         self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = silent

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import torch
-from jaxtyping import Int64, Shaped
+from jaxtyping import Bool, Int64, Shaped
 from torch import Tensor
 
 from behaviours.demonstrations import Demonstrations
@@ -78,6 +78,12 @@ class Samples:
     def settled(self, contradictions: Contradictions) -> "Samples":
         """The same samples, each with the result that its condition shall have."""
         return replace(self, result=self.targets(contradictions)[self.condition])
+
+    def missed(self, answers: Int64[Tensor, "k"]) -> Bool[Tensor, "k"]:
+        """Which conditions are answered with a result that is none of their most frequent ones."""
+        shape = len(self.conditions), len(self.results)
+        counts = torch.bincount(self.condition * shape[1] + self.result, minlength=shape[0] * shape[1]).view(shape)
+        return counts.gather(1, answers[:, None])[:, 0] < counts.amax(1)
 
     def report(self, rule: str, **counts: int) -> LearningReport:
         """The report of a rule that trains on all conditions, with its further `counts`."""

@@ -24,6 +24,7 @@ def rule(name: str) -> Any:
 
 @pytest.mark.parametrize("name", RULES)
 @pytest.mark.parametrize("dim", [8, 300])  # among 8 elements, many conditions of other bins are the same
+@pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 def test_every_rule_learns_the_same_program(name: str, dim: int, monkeypatch: pytest.MonkeyPatch) -> None:
     made = space(dim)
     held = rule(name).fit(made, shown())

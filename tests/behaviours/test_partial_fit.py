@@ -97,6 +97,7 @@ def test_other_integer_codes_in_pieces(vsa: str, clip: bool) -> None:
     assert same_bits(pieces.known, whole.known)
 
 
+@pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 @in_pieces
 def test_a_piece_leaves_the_behaviour_before_it_as_it_is(rule: Rule) -> None:
     first, then = cut(random_pairs(20), [10])
@@ -146,6 +147,7 @@ def test_a_report_of_two_pieces() -> None:
     assert a.then(b) == both
 
 
+@pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 @pytest.mark.parametrize("rule", [ErrorDriven(), Gradient(learning_rate=0.1)], ids=["error_driven", "gradient"])
 @pytest.mark.parametrize("vsa", ["MAP-C", "FHRR", "BSC"])
 def test_training_goes_on_from_the_program_at_hand(rule: Rule, vsa: str) -> None:

@@ -30,6 +30,7 @@ def test_ten_pairs_are_recalled(rule: str, vsa: str) -> None:
     assert (behaviour(shown.sensors).familiarity > 0.5 / 10**0.5).all()
 
 
+@pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 @rules
 def test_progress_rises_to_one(rule: str) -> None:
     shares: list[float] = []

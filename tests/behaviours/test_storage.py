@@ -16,6 +16,7 @@ from safetensors.torch import load, save_file
 
 import torchvsa
 from behaviours import BehaviourBank, Demonstrations, ErrorDriven, OneShot, Space
+from behaviours.learning import no_convergence_warnings
 from behaviours.storage import load_tensors, save_tensors
 from torchvsa import ARCHITECTURES
 from torchvsa.encoders import History
@@ -28,7 +29,8 @@ def real(tensor: torch.Tensor) -> torch.Tensor:
 def bank(vsa: str = "MAP-C", protection: Any = "self_shift", dtype: str | None = None, **encoder: Any) -> BehaviourBank:
     made = BehaviourBank(space(128, vsa, dtype, protection, seed=3, **encoder))
     made.learn("seek light", random_pairs(9), OneShot("similarity", clip_each_step=True))
-    made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(passes=2))
+    with no_convergence_warnings():
+        made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(passes=2))
     return made
 
 
