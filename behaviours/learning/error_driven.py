@@ -241,8 +241,9 @@ def _hopeless(corrections: Sequence[int], pairs: int, patience: int, passes: int
 
     The rate is how the mean of the last `patience` passes lies below that of as many before. Corrections become rarer
     ever more slowly, so that a straight line promises too much rather than too little. The root of the number of pairs
-    allows for chance: with it, none of 1,002 runs that converge within 200 passes is ended (random pairs near capacity,
-    d from 64 to 1,000, four kinds of codes, margins 0, 0.5 and 2), and 192 of 334 that do not converge are.
+    allows for chance. These numbers were chosen on random pairs near capacity (d from 64 to 1,000, integer codes of
+    four kinds, margins 0, 0.5 and 2); with other seeds, none of 761 runs that converge within 200 passes was ended,
+    and 157 of 286 that do not were.
     """
     if not 2 * patience <= len(corrections) < passes:
         return False
