@@ -8,7 +8,7 @@ from behaviours.composition import POLICIES, Bundle, Policy, Priority
 from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
 from behaviours.edges import quantile_edges
-from behaviours.learning import RULES, ErrorDriven, Gradient, LeastSquares, OneShot, Rule
+from behaviours.learning import RULES, ConvergenceWarning, ErrorDriven, Gradient, LeastSquares, OneShot, Rule
 from behaviours.recall import Recall
 from behaviours.reflex import Reflex
 from behaviours.report import LearningReport
@@ -27,6 +27,7 @@ __all__ = [
     "BehaviourBank",
     "Bundle",
     "Controller",
+    "ConvergenceWarning",
     "Demonstrations",
     "ErrorDriven",
     "Gradient",

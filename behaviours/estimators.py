@@ -126,8 +126,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
             # Another seed for each call, or all would visit their rows in the same order.
             rule = self._rule(before.space.seed + before.report.updates)
             shown = Demonstrations(torch.tensor(readings), labels)
-            self.behaviour_ = self._trained(lambda: rule.partial_fit(before, shown))
-            self._progress()(1.0)
+            self.behaviour_ = self._trained(lambda: rule.partial_fit(before, shown, self._progress()))
         return self
 
     def _check_parameters(self) -> None:
