@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-FIRST, SECOND = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+FIRST, PAPER, CLASSIFIER = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def run(code: str) -> str:
@@ -20,16 +20,19 @@ def run(code: str) -> str:
     return done.stdout
 
 
-def test_the_ten_lines_run_and_answer() -> None:
-    lines = [line for line in FIRST.splitlines() if line.strip()]
-    assert len(lines) == 10
+def test_the_first_lines_are_few_run_and_answer() -> None:
+    assert len([line for line in FIRST.splitlines() if line.strip()]) <= 10
     code = FIRST + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
     code += "assert 'program' in steer.state_dict() and steer.program.shape == (4000,)\n"
     assert "program" in run(code)
 
 
+def test_the_parts_of_the_paper_are_made() -> None:
+    assert "SelfShift" in run(PAPER)
+
+
 def test_the_classifier_scores_what_one_would_hope() -> None:
-    assert float(run(SECOND)) > 0.99
+    assert float(run(CLASSIFIER)) > 0.99
 
 
 def test_the_files_that_it_names_are_there() -> None:
