@@ -76,43 +76,29 @@ class RememberingSpace(Space):
 
 
 class Recent:
-    """Remembers the latest readings of each episode, and returns them as windows.
+    """The latest readings of robots that drive, as windows; like an RNN cell, with an explicit state.
 
     With `hold`, a reading that was not observed is replaced by the last one of its sensor that was, however old.
 
-    An episode's memory begins with its step 0 and depends on nothing but its own readings, so that the windows
-    are the same whatever else is in the batch. Before step 0 lies NaN: not observed.
+    The state is the past of each robot, `[B, p, sensors]`, the latest first; before its first step, NaN (not observed).
+    Robots do not influence each other.
     """
 
-    def __init__(self, lags: Sequence[int], hold: bool = False) -> None:
-        self.lags, self.hold = check_lags(lags), hold
-        self._past: dict[int, tuple[int, NDArray[np.float64]]] = {}
+    def __init__(self, sensors: int, lags: Sequence[int], hold: bool = False) -> None:
+        self.sensors, self.lags, self.hold = sensors, check_lags(lags), hold
 
-    def __call__(
-        self, readings: NDArray[np.float64], episodes: NDArray[np.int64], steps: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
-        """Windows `[B, (1 + len(lags)) · n]` for readings `[B, n]` of `episodes` `[B]` at `steps` `[B]`.
+    def start(self, batch: int) -> NDArray[np.float64]:
+        """The past of `batch` robots that have seen nothing yet."""
+        return np.full((batch, max(self.lags, default=int(self.hold)), self.sensors), np.nan)
 
-        Raises `ValueError` if an episode skips or repeats a step.
-        """
-        rows = [
-            self._window(row, episode, step)
-            for row, episode, step in zip(readings, episodes.tolist(), steps.tolist(), strict=True)
-        ]
-        return np.stack(rows) if rows else np.empty((0, (1 + len(self.lags)) * readings.shape[1]))
-
-    def _window(self, row: NDArray[np.float64], episode: int, step: int) -> NDArray[np.float64]:
-        if step == 0:
-            kept = np.full((max(self.lags, default=0) + 1, len(row)), np.nan)
-        else:
-            last, kept = self._past.get(episode, (-1, row[None]))
-            if last != step - 1:
-                raise ValueError(f"episode {episode} is asked about step {step} after step {last}; a step was missed")
+    def step(
+        self, readings: NDArray[np.float64], past: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Windows `[B, (1 + len(lags)) · n]` for readings `[B, n]`, and the past for the next step."""
         if self.hold:
-            row = np.where(np.isnan(row), kept[0], row)
-        kept = np.concatenate([row[None], kept[:-1]])
-        self._past[episode] = step, kept
-        return kept[[0, *self.lags]].ravel()
+            readings = np.where(np.isnan(readings), past[:, 0], readings)
+        seen = np.concatenate([readings[:, None], past], axis=1)
+        return seen[:, [0, *self.lags]].reshape(len(readings), -1), seen[:, : past.shape[1]]
 
 
 def windows(
@@ -120,7 +106,7 @@ def windows(
 ) -> Float64[Tensor, "N w"]:
     """The windows of recorded readings, whose rows are the steps of one episode after the other.
 
-    Equal to what `Recent` returns for the same readings, one by one. Raises `ValueError` if an episode's rows do
+    Equal to what `Recent` returns for the same readings, step by step. Raises `ValueError` if an episode's rows do
     not stand together.
     """
     lags = check_lags(lags)

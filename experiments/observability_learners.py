@@ -46,15 +46,20 @@ class Learned:
     tried: dict[str, float] = field(default_factory=dict)
 
 
-class Through:
-    """A learner that drives, and sees its sensors through a disturbance only: a policy of the simulator."""
+class Remembering:
+    """A learner that drives: a controller whose state is the past readings `[B, p, n]` of each robot."""
 
-    def __init__(self, learned: Learned, disturbance: Disturbance) -> None:
-        self.answer, self.disturbance, self.recent = learned.answer, disturbance, learned.memory.recent()
+    def __init__(self, learned: Learned) -> None:
+        self.answer, self.recent = learned.answer, learned.memory.recent()
 
-    def __call__(self, sensors: Floats, episodes: Integers, steps: Integers) -> Floats:
-        """Commands `[B, m]` for the true readings `[B, n]`."""
-        return self.answer(self.recent(self.disturbance(sensors, episodes, steps), episodes, steps))
+    def start(self, episodes: Integers) -> Floats:
+        """See `sim.Controller`."""
+        return self.recent.start(len(episodes))
+
+    def step(self, readings: Floats, state: Floats) -> tuple[Floats, Floats]:
+        """Commands `[B, m]` for readings `[B, n]`."""
+        window, state = self.recent.step(readings, state)
+        return self.answer(window), state
 
 
 class Asked:
@@ -104,7 +109,7 @@ class Agreement:
 
 
 def compare(learned: Learned, disturbance: Disturbance, lessons: Lessons, every: int) -> Agreement:
-    """Ask the learner about every so manieth step of the recorded runs, disturbed."""
+    """Ask the learner about every `every`-th step of the recorded runs, disturbed."""
     chosen = lessons.counts & (lessons.steps % every == 0)
     seen = lessons.seen([disturbance], learned.memory).numpy()[chosen]
     levels = presets.schema()

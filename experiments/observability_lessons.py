@@ -27,7 +27,7 @@ class Memory:
 
     def recent(self) -> Recent:
         """The memory of robots that drive."""
-        return Recent(self.lags, self.hold)
+        return Recent(len(sim.SENSORS), self.lags, self.hold)
 
     def __str__(self) -> str:
         steps = "step" if self.lags == (1,) else "steps"
@@ -59,7 +59,7 @@ class Lessons:
 
     def seen(self, disturbances: Sequence[Disturbance], memory: Memory) -> Float64[Tensor, "N w"]:
         """What a learner with that memory sees of them; the disturbances take turns, one an episode."""
-        disturbed = mixed(disturbances, self.readings, self.episodes, self.steps)
+        disturbed = mixed(disturbances, self.readings, self.episodes)
         return windows(torch.from_numpy(disturbed), torch.from_numpy(self.episodes), memory.lags, memory.hold)
 
     def demonstrations(self, disturbances: Sequence[Disturbance], memory: Memory) -> Demonstrations:

@@ -113,30 +113,33 @@ def test_a_reading_is_held_until_the_next_one_arrives() -> None:
     torch.testing.assert_close(seen, expected, rtol=0, atol=0, equal_nan=True)
 
 
+@pytest.mark.parametrize("lags", [(), (1,), LAGS])
 @pytest.mark.parametrize("hold", [False, True])
 @pytest.mark.parametrize("together", [1, 2, 3])
-def test_online_memory_is_offline_memory_at_any_batch_size(together: int, hold: bool) -> None:
+def test_online_memory_is_offline_memory_at_any_batch_size(lags: tuple[int, ...], together: int, hold: bool) -> None:
     readings, episodes, steps = (column.numpy() for column in recording())
-    expected = windows(torch.from_numpy(readings), torch.from_numpy(episodes), LAGS, hold).numpy()
-    recent, found = Recent(LAGS, hold), np.zeros_like(expected)
+    expected = windows(torch.from_numpy(readings), torch.from_numpy(episodes), lags, hold).numpy()
+    recent, found = Recent(2, lags, hold), np.zeros_like(expected)
     groups = [np.unique(episodes)[i : i + together] for i in range(0, 3, together)]
     for group in groups:
+        past = recent.start(len(group))
         for step in range(12):
-            rows = np.flatnonzero((steps == step) & np.isin(episodes, group))
-            found[rows] = recent(readings[rows], episodes[rows], steps[rows])
+            rows = np.array([np.flatnonzero((steps == step) & (episodes == one))[0] for one in group])
+            found[rows], past = recent.step(readings[rows], past)
     np.testing.assert_array_equal(found, expected)
 
 
 @pytest.mark.parametrize("hold", [False, True])
-def test_an_episode_that_begins_again_has_forgotten(hold: bool) -> None:
-    recent = Recent([1], hold)
-    first, zero = np.array([5]), np.array([0])
-    recent(np.array([[1.0]]), first, zero)
-    assert np.isnan(recent(np.array([[NAN]]), first, zero)).all()
-    assert np.isnan(recent(np.array([[2.0]]), first, zero)[0, 1])
-    assert recent(np.array([[3.0]]), first, zero + 1)[0].tolist() == [3.0, 2.0]
-    with pytest.raises(ValueError, match="episode 5 is asked about step 3 after step 1"):
-        recent(np.array([[3.0]]), first, zero + 3)
+def test_a_past_is_a_value_that_can_be_taken_up_again(hold: bool) -> None:
+    recent = Recent(1, [1], hold)
+    _, past = recent.step(np.array([[1.0]]), recent.start(1))
+    before = past.copy()
+    for _ in range(2):
+        window, later = recent.step(np.array([[3.0]]), past)
+        assert window[0].tolist() == [3.0, 1.0]
+        assert later.tolist() == [[[3.0]]]
+    np.testing.assert_array_equal(past, before)
+    assert np.isnan(recent.step(np.array([[NAN]]), recent.start(1))[0]).all()
 
 
 def test_memory_tells_apart_what_looks_alike_now() -> None:
