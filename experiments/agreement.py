@@ -45,14 +45,16 @@ class Agreement:
     by_rule: dict[str, float]
 
 
-def right(policy: sim.Policy, samples: Demonstrations, steps: NDArray[np.int64] | None = None) -> NDArray[np.bool_]:
-    """For each sample, whether the policy's commands have the levels of the teacher's, `[N]`."""
-    steps = np.zeros(len(samples), dtype=np.int64) if steps is None else steps
+def right(policy: sim.Policy, samples: Demonstrations) -> NDArray[np.bool_]:
+    """For each sample, whether the policy's commands have the levels of the teacher's, `[N]`.
+
+    A controller with a state sees the samples of each episode one after the other, from its start.
+    """
     mind = getattr(policy, "mind", None)
     if isinstance(mind, Behaviour | Policy):
         commands = _recalled(mind, samples)
     else:
-        commands = torch.from_numpy(policy(samples.sensors.numpy(), samples.episodes.numpy(), steps))
+        commands = torch.from_numpy(sim.replay(policy, samples.sensors.numpy(), samples.episodes.numpy()))
     levels = schema()
     return (levels.command_levels(commands) == levels.command_levels(samples.commands)).all(-1).numpy()
 
@@ -71,7 +73,6 @@ def measure(
     controller: Controller,
     train: Demonstrations,
     heldout: Demonstrations,
-    heldout_steps: NDArray[np.int64],
     reference: Space,
 ) -> Agreement:
     """Compare a controller with the teacher. Controllers without bins are judged at those of `reference`.
@@ -83,7 +84,7 @@ def measure(
     own = distinct_rows(conditions)[1].numpy()
     train_own, heldout_own = own[: len(train)], own[len(train) :]
     train_right = right(controller.policy, train)
-    heldout_right = right(controller.policy, heldout, heldout_steps)
+    heldout_right = right(controller.policy, heldout)
     # Raw readings do not contradict each other; binned ones can.
     agreed = np.ones(len(train), dtype=bool)
     if controller.space is not None:

@@ -15,7 +15,7 @@ from sklearn.tree import DecisionTreeClassifier
 import sim
 import torchvsa
 from behaviours import Behaviour, BehaviourBank, Demonstrations, LearningReport, Policy, Space
-from experiments import hand_written, presets
+from experiments import draws, hand_written, presets
 from experiments.agreement import share_right
 
 
@@ -66,7 +66,7 @@ class Recalled:
         self.mind = mind
 
     @torch.no_grad()
-    def __call__(self, sensors: NDArray[np.float64], *_: NDArray[np.int64]) -> NDArray[np.float64]:
+    def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commands `[B, 2]` for readings `[B, 3]`."""
         return self.mind(sensors).commands.numpy()
 
@@ -79,7 +79,7 @@ class Classified:
         self.commands: NDArray[np.float64] = commands
         self.model = model.fit(train.sensors.numpy(), labels.ravel())
 
-    def __call__(self, sensors: NDArray[np.float64], *_: NDArray[np.int64]) -> NDArray[np.float64]:
+    def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commands `[B, 2]` for readings `[B, 3]`."""
         return self.commands[np.asarray(self.model.predict(sensors), dtype=np.int64)]
 
@@ -89,22 +89,18 @@ class RandomCommands:
 
     def __init__(self, seed: int) -> None:
         self.seed = seed
-        self._tables: dict[int, NDArray[np.float64]] = {}
 
-    def __call__(
-        self, sensors: NDArray[np.float64], episodes: NDArray[np.int64], steps: NDArray[np.int64]
-    ) -> NDArray[np.float64]:
+    def start(self, episodes: NDArray[np.int64]) -> draws.Drawn:
+        """See `sim.Controller`."""
+        return draws.start([(self.seed, episode) for episode in episodes.tolist()], _uniform)
+
+    def step(self, readings: NDArray[np.float64], state: draws.Drawn) -> tuple[NDArray[np.float64], draws.Drawn]:
         """Commands `[B, 2]`, whatever the readings."""
-        return np.stack([self._row(e, s) for e, s in zip(episodes.tolist(), steps.tolist(), strict=True)])
+        return draws.step(state, _uniform)
 
-    def _row(self, episode: int, step: int) -> NDArray[np.float64]:
-        table = self._tables.get(episode)
-        if table is None or step >= len(table):
-            # A longer draw from the same generator begins with the shorter one.
-            size = max(2048, 2 * step)
-            table = np.random.default_rng([self.seed, episode]).uniform(-1, 1, (size, len(sim.ACTUATORS)))
-            self._tables[episode] = table
-        return table[step]
+
+def _uniform(generator: np.random.Generator, rows: int) -> NDArray[np.float64]:
+    return generator.uniform(-1, 1, (rows, len(sim.ACTUATORS)))
 
 
 def _teacher(study: Study) -> Controller:

@@ -79,12 +79,12 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
         )
         examined = driver.drive("teacher, held out", sim.Teacher(), range(config["starts"]), record=True)
         heldout, moves = shown_in(examined)
-        heldout, steps = heldout.where(moves.tolist()), examined.trajectory.step[moves]
+        heldout = heldout.where(moves.tolist())
 
         controllers, rollouts, agreements = {}, {}, {}
         for name in config["controllers"]:
             controller = CONTROLLERS[name](learn_from)
-            agreements[name] = measure(controller, moving, heldout, steps, reference)
+            agreements[name] = measure(controller, moving, heldout, reference)
             if name == "teacher" and config["body"]["name"] == examined.body:
                 rollouts[name] = examined
             else:
@@ -129,11 +129,12 @@ def _starts(config: Mapping[str, Any], name: str) -> int:
 def _query_seconds(policy: sim.Policy, readings: np.ndarray, calls: int = 200) -> float:
     """Median time of one answer to one robot, over readings that the teacher met."""
     rows = readings[np.linspace(0, len(readings) - 1, calls).astype(int)]
-    zero = np.zeros(1, dtype=np.int64)
+    controller = sim.as_controller(policy)
+    state = controller.start(np.zeros(1, dtype=np.int64))
     times = []
     for row in rows:
         start = time.perf_counter()
-        policy(row[None], zero, zero)
+        _, state = controller.step(row[None], state)
         times.append(time.perf_counter() - start)
     return statistics.median(times)
 

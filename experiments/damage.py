@@ -62,9 +62,9 @@ class Damage:
 
 
 class Damaged(Protocol):
-    """A learner of which a part was damaged. It is a policy of the simulator."""
+    """A learner of which a part was damaged. It can drive in the simulator."""
 
-    def __call__(self, sensors: Floats, *_: NDArray[np.int64]) -> Floats:
+    def __call__(self, sensors: Floats) -> Floats:
         """Commands `[B, 2]` for readings `[B, 3]`."""
         ...
 

@@ -40,7 +40,7 @@ class DamagedProgram:
             winners.append(answers.argmax(-1).numpy())
         return np.concatenate(winners)
 
-    def __call__(self, sensors: Floats, *_: NDArray[np.int64]) -> Floats:
+    def __call__(self, sensors: Floats) -> Floats:
         """Commands `[B, 2]` for readings `[B, 3]`."""
         rows = [tuple(row) for row in self.space.cells(sensors).tolist()]
         new = [row for row in dict.fromkeys(rows) if row not in self._known]

@@ -48,7 +48,7 @@ class _NetworkPolicy:
     layers: list[Floats]
     classes: Floats
 
-    def __call__(self, sensors: Floats, *_: NDArray[np.int64]) -> Floats:
+    def __call__(self, sensors: Floats) -> Floats:
         weights_in, weights_out, bias_in, bias_out = self.layers
         hidden = np.maximum((sensors - self.mean) / self.scale @ weights_in + bias_in, 0.0)
         return self.classes[(hidden @ weights_out + bias_out).argmax(-1)]
@@ -96,7 +96,7 @@ class _TreePolicy:
     thresholds: Floats
     answers: Floats
 
-    def __call__(self, sensors: Floats, *_: NDArray[np.int64]) -> Floats:
+    def __call__(self, sensors: Floats) -> Floats:
         # The tree compares in single precision, and its thresholds lie between readings of that precision.
         places = ((sensors - self.low) / self.span).astype(np.float32)
         node = np.zeros(len(places), dtype=np.int64)

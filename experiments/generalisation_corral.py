@@ -67,25 +67,23 @@ class Combination:
 
 @dataclass(frozen=True)
 class Lesson:
-    """Runs of the teacher: readings `[N, n]`, commands `[N, m]`, episode and step of each row."""
+    """Runs of the teacher: readings `[N, n]`, commands `[N, m]`, and the episode of each row."""
 
     sensors: NDArray[np.float64]
     commands: NDArray[np.float64]
     episodes: NDArray[np.int64]
-    steps: NDArray[np.int64]
 
     @classmethod
     def of(cls, rollout: sim.Rollout, moving: bool) -> Lesson:
         """The recorded steps of a rollout; those before the lamp was reached only, if `moving`."""
         shown, before = shown_in(rollout)
         keep = before if moving else np.ones(len(before), dtype=bool)
-        steps = rollout.trajectory.step[keep]
-        return cls(shown.sensors.numpy()[keep], shown.commands.numpy()[keep], shown.episodes.numpy()[keep], steps)
+        return cls(shown.sensors.numpy()[keep], shown.commands.numpy()[keep], shown.episodes.numpy()[keep])
 
     def of_episodes(self, episodes: Sequence[int]) -> Lesson:
         """The rows of some episodes only."""
         keep = np.isin(self.episodes, episodes)
-        return Lesson(self.sensors[keep], self.commands[keep], self.episodes[keep], self.steps[keep])
+        return Lesson(self.sensors[keep], self.commands[keep], self.episodes[keep])
 
     @property
     def demonstrations(self) -> Demonstrations:
@@ -212,7 +210,7 @@ def _agreement(policy: sim.Policy, space: Space, lesson: Lesson, examined: Lesso
 
     The conditions of all learners, rivals included, are told apart at the same bins.
     """
-    correct = right(policy, examined.demonstrations, examined.steps)
+    correct = right(policy, examined.demonstrations)
     bins = torch.cat([space.cells(lesson.sensors), space.cells(examined.sensors)])
     own = distinct_rows(bins)[1].numpy()
     met = np.unique(own[: len(lesson.sensors)])

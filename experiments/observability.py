@@ -22,17 +22,17 @@ from omegaconf import DictConfig
 from rich.console import Console
 
 import sim
-from behaviours.remembering import check_lags
 from experiments import presets
 from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.driving import Driver, drive_here, progress_bars, workers
 from experiments.jobs import run_jobs
 from experiments.lessons import FIRST_DEMONSTRATION, FIRST_VALIDATION
-from experiments.observability_disturbances import DISTURBANCES, Disturbance
-from experiments.observability_learners import LEARNERS, Study, Through, compare
+from experiments.observability_disturbances import DISTURBANCES, Disturbance, Disturbed
+from experiments.observability_learners import LEARNERS, Remembering, Study, compare
 from experiments.observability_lessons import Lessons
 from experiments.results import Results, Row
+from torchvsa.encoders.history import check_lags
 
 FIGURES = ("agreement", "balanced_agreement", "success_rate")
 
@@ -104,7 +104,7 @@ def examine(learner: str, material: Study, heldout: Lessons) -> Examined:
         which = {"learner": learner, "disturbance": disturbance.name, "strength": float(strength)}
         asked = compare(learned, disturbance, heldout, config["compare_every"])
         rollout = (
-            drive_here(config, Through(learned, disturbance), range(config["starts"]), arena)
+            drive_here(config, Disturbed(disturbance, Remembering(learned)), range(config["starts"]), arena)
             if config["starts"]
             else None
         )

@@ -1,20 +1,21 @@
 """What can come between a robot's sensors and its program. Every disturbance is drawn from (seed, episode) alone.
 
-A disturbance is a function of the true readings `[B, n]` of some `episodes` `[B]` at some `steps` `[B]`, as a policy
-of the simulator is: an episode is disturbed in the same way whatever else is in the batch. Strength 0 changes
-nothing. Steps of an episode are asked for in order, from 0 on.
+A disturbance maps true readings `[B, n]` to disturbed ones, step by step and with an explicit state, as a controller
+maps readings to commands (see `sim.Controller`): an episode is disturbed in the same way whatever else is in the batch.
+Strength 0 changes nothing.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 import sim
+from experiments import draws
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -39,7 +40,6 @@ class Disturbance(ABC):
     def __init__(self, strength: float, seed: int) -> None:
         self.strength, self.seed = strength, seed
         self.check(strength)
-        self._kept: dict[int, Floats] = {}
 
     @classmethod
     def check(cls, strength: float) -> None:
@@ -52,38 +52,48 @@ class Disturbance(ABC):
         """The strength in words."""
         return f"{strength:g}"
 
-    def __call__(self, readings: Floats, episodes: Integers, steps: Integers) -> Floats:
-        """The disturbed readings `[B, n]`; NaN where nothing arrives."""
-        if self.strength == 0:
-            return readings.copy()
-        rows = zip(readings, episodes.tolist(), steps.tolist(), strict=True)
-        return np.array([self.disturb(*row) for row in rows]).reshape(readings.shape)
+    def start(self, episodes: Integers) -> Any:
+        """The state at the beginning of these episodes `[B]`."""
+        return None if self.strength == 0 else self.begin(episodes)
+
+    def step(self, readings: Floats, state: Any) -> tuple[Floats, Any]:
+        """The disturbed readings `[B, n]`, NaN where nothing arrives, and the next state."""
+        return (readings.copy(), state) if self.strength == 0 else self.disturb(readings, state)
+
+    def begin(self, episodes: Integers) -> Any:
+        """The state of a strength above 0: none, unless a subclass has one."""
+        return None
 
     @abstractmethod
-    def disturb(self, row: Floats, episode: int, step: int) -> Floats:
-        """The disturbed reading `[n]` of one robot."""
+    def disturb(self, readings: Floats, state: Any) -> tuple[Floats, Any]:
+        """One step at a strength above 0."""
 
-    def draw(self, episode: int, rows: int) -> tuple[np.random.Generator, int]:
-        """An episode's own generator, and how many rows to draw from it."""
+    def seed_of(self, episode: int) -> list[int]:
+        """The seed of an episode's random numbers."""
         # The name is part of the seed, so that two disturbances of a run do not strike at the same steps.
-        return np.random.default_rng([self.seed, episode, *self.name.encode()]), rows
+        return [self.seed, episode, *self.name.encode()]
 
 
 class _Drawn(Disturbance):
     """A disturbance with fresh random numbers for each sensor and step."""
 
-    def numbers(self, episode: int, step: int) -> Floats:
-        """The random numbers `[n]` of one step."""
-        table = self._kept.get(episode)
-        if table is None or step >= len(table):
-            # A longer draw from the same generator begins with the shorter one.
-            generator, rows = self.draw(episode, max(1200, 2 * step))
-            table = self._kept[episode] = self.table(generator, rows)
-        return table[step]
+    def begin(self, episodes: Integers) -> draws.Drawn:
+        """Random numbers for each episode."""
+        return draws.start([self.seed_of(episode) for episode in episodes.tolist()], self.draw)
+
+    def disturb(self, readings: Floats, state: draws.Drawn) -> tuple[Floats, draws.Drawn]:
+        """Disturbed by the next random numbers."""
+        numbers, state = draws.step(state, self.draw)
+        return self.disturbed(readings, numbers), state
+
+    @staticmethod
+    @abstractmethod
+    def draw(generator: np.random.Generator, rows: int) -> Floats:
+        """Random numbers `[rows, n]`."""
 
     @abstractmethod
-    def table(self, generator: np.random.Generator, rows: int) -> Floats:
-        """Random numbers `[rows, n]`."""
+    def disturbed(self, readings: Floats, numbers: Floats) -> Floats:
+        """Readings `[B, n]` disturbed by random numbers `[B, n]`."""
 
 
 class Missing(_Drawn):
@@ -93,13 +103,14 @@ class Missing(_Drawn):
     axis = "share of readings lost"
     gaps = True
 
-    def table(self, generator: np.random.Generator, rows: int) -> Floats:
+    @staticmethod
+    def draw(generator: np.random.Generator, rows: int) -> Floats:
         """Uniform in [0, 1)."""
         return generator.uniform(size=(rows, len(NAMES)))
 
-    def disturb(self, row: Floats, episode: int, step: int) -> Floats:
+    def disturbed(self, readings: Floats, numbers: Floats) -> Floats:
         """NaN where lost."""
-        return np.where(self.numbers(episode, step) < self.strength, np.nan, row)
+        return np.where(numbers < self.strength, np.nan, readings)
 
 
 class Noisy(_Drawn):
@@ -108,13 +119,14 @@ class Noisy(_Drawn):
     name = "noisy"
     axis = "noise, share of the sensor's range"
 
-    def table(self, generator: np.random.Generator, rows: int) -> Floats:
+    @staticmethod
+    def draw(generator: np.random.Generator, rows: int) -> Floats:
         """Standard normal."""
         return generator.standard_normal((rows, len(NAMES)))
 
-    def disturb(self, row: Floats, episode: int, step: int) -> Floats:
+    def disturbed(self, readings: Floats, numbers: Floats) -> Floats:
         """With noise added."""
-        return np.clip(row + self.strength * (HIGH - LOW) * self.numbers(episode, step), LOW, HIGH)
+        return np.clip(readings + self.strength * (HIGH - LOW) * numbers, LOW, HIGH)
 
 
 class Stuck(Disturbance):
@@ -123,23 +135,22 @@ class Stuck(Disturbance):
     name = "stuck"
     axis = "share of sensors that get stuck"
 
-    def __init__(self, strength: float, seed: int) -> None:
-        super().__init__(strength, seed)
-        self._onsets: dict[int, Floats] = {}
+    def begin(self, episodes: Integers) -> tuple[Floats, Floats]:
+        """The steps left until each sensor gets stuck, and its latest reading, `[B, n]` each."""
+        left = np.array([self.onset(episode) for episode in episodes.tolist()])
+        return left, np.full_like(left, np.nan)
 
-    def disturb(self, row: Floats, episode: int, step: int) -> Floats:
-        """The latest reading of sensors that still work, the last one of those that do not."""
-        if step == 0:
-            self._onsets[episode] = self.onset(episode)
-        row = row.copy() if step == 0 else np.where(step > self._onsets[episode], self._kept[episode], row)
-        self._kept[episode] = row
-        return row
+    def disturb(self, readings: Floats, state: tuple[Floats, Floats]) -> tuple[Floats, tuple[Floats, Floats]]:
+        """The present reading of sensors that still work, the last one of those that do not."""
+        left, last = state
+        readings = np.where(left < 0, last, readings)
+        return readings, (left - 1, readings)
 
     def onset(self, episode: int) -> Floats:
         """The step at which each sensor gets stuck, `[n]`; infinity if it never does."""
-        generator, sensors = self.draw(episode, len(NAMES))
-        fails = generator.uniform(size=sensors) < self.strength
-        return np.where(fails, generator.integers(0, round(STUCK_WITHIN * sim.CONTROL_HZ), sensors), np.inf)
+        generator = np.random.default_rng(self.seed_of(episode))
+        fails = generator.uniform(size=len(NAMES)) < self.strength
+        return np.where(fails, generator.integers(0, round(STUCK_WITHIN * sim.CONTROL_HZ), len(NAMES)), np.inf)
 
 
 class Delayed(Disturbance):
@@ -154,11 +165,18 @@ class Delayed(Disturbance):
         if strength < 0 or strength != int(strength):
             raise ValueError(f"{cls.name}: strength is a whole number of control steps; got {strength:g}")
 
-    def disturb(self, row: Floats, episode: int, step: int) -> Floats:
+    def begin(self, episodes: Integers) -> tuple[NDArray[np.bool_], Floats]:
+        """Whether the episode has only begun `[B]`, and the readings on their way `[B, strength, n]`, oldest first."""
+        batch = len(episodes)
+        return np.ones(batch, dtype=np.bool_), np.full((batch, int(self.strength), len(NAMES)), np.nan)
+
+    def disturb(
+        self, readings: Floats, state: tuple[NDArray[np.bool_], Floats]
+    ) -> tuple[Floats, tuple[NDArray[np.bool_], Floats]]:
         """The reading `strength` steps before."""
-        waiting = np.repeat(row[None], int(self.strength), 0) if step == 0 else self._kept[episode]
-        self._kept[episode] = np.concatenate([waiting[1:], row[None]])
-        return waiting[0]
+        new, waiting = state
+        waiting = np.where(new[:, None, None], readings[:, None], waiting)
+        return waiting[:, 0], (np.zeros_like(new), np.concatenate([waiting[:, 1:], readings[:, None]], axis=1))
 
 
 class Aliased(Disturbance):
@@ -181,21 +199,42 @@ class Aliased(Disturbance):
         """The sensors that are gone."""
         return " and ".join(NAMES[i].replace("_", " ") for i in cls.WITHOUT[int(strength)]) or "none"
 
-    def disturb(self, row: Floats, episode: int, step: int) -> Floats:
+    def disturb(self, readings: Floats, state: None) -> tuple[Floats, None]:
         """NaN for the sensors that are gone."""
-        row = row.copy()
-        row[list(self.WITHOUT[int(self.strength)])] = np.nan
-        return row
+        readings = readings.copy()
+        readings[:, list(self.WITHOUT[int(self.strength)])] = np.nan
+        return readings, state
+
+
+class Disturbed:
+    """A controller that sees its sensors through a disturbance only; its state is the pair of both states."""
+
+    def __init__(self, disturbance: Disturbance, policy: sim.Policy) -> None:
+        self.disturbance, self.controller = disturbance, sim.as_controller(policy)
+
+    def start(self, episodes: Integers) -> tuple[Any, Any]:
+        """See `sim.Controller`."""
+        return self.disturbance.start(episodes), self.controller.start(episodes)
+
+    def step(self, readings: Floats, state: tuple[Any, Any]) -> tuple[Any, tuple[Any, Any]]:
+        """The controller's answer to the disturbed readings."""
+        seen, disturbance = self.disturbance.step(readings, state[0])
+        answer, controller = self.controller.step(seen, state[1])
+        return answer, (disturbance, controller)
 
 
 DISTURBANCES: dict[str, type[Disturbance]] = {d.name: d for d in (Missing, Stuck, Delayed, Noisy, Aliased)}
 
 
-def mixed(disturbances: Sequence[Disturbance], readings: Floats, episodes: Integers, steps: Integers) -> Floats:
-    """The same with the disturbances taking turns, one an episode: the first, the second, ..."""
+def mixed(disturbances: Sequence[Disturbance], readings: Floats, episodes: Integers) -> Floats:
+    """Recorded readings `[N, n]` with the disturbances taking turns, one per episode: the first, the second, ...
+
+    The rows of an episode are its steps from 0 on, in this order.
+    """
     _, turn = np.unique(episodes, return_inverse=True)
     result = np.empty_like(readings)
     for index, disturbance in enumerate(disturbances):
         own = turn % len(disturbances) == index
-        result[own] = disturbance(readings[own], episodes[own], steps[own])
+        if own.any():
+            result[own] = sim.replay(disturbance, readings[own], episodes[own])
     return result

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 import torch
 from sklearn.tree import DecisionTreeClassifier
+from torch import Tensor
 
 import sim
-from behaviours import Behaviour, Demonstrations, Gradient, Space
+from behaviours import Behaviour, Demonstrations, Gradient, Schema, Space
 from behaviours.learning import no_convergence_warnings
-from behaviours.remembering import RememberingSpace
 from experiments import presets
 from experiments.observability_disturbances import Disturbance, Floats, Integers
 from experiments.observability_lessons import Lessons, Memory
+from torchvsa.encoders import Encoder, History
 
 NO_MEMORY = Memory()
 Answer = Callable[[Floats], Floats]
@@ -47,15 +48,61 @@ class Learned:
     tried: dict[str, float] = field(default_factory=dict)
 
 
-class Through:
-    """A learner that drives, and sees its sensors through a disturbance only: a policy of the simulator."""
+class Remembering:
+    """A learner that drives: a controller whose state is the past readings `[B, p, n]` of each robot."""
 
-    def __init__(self, learned: Learned, disturbance: Disturbance) -> None:
-        self.answer, self.disturbance, self.recent = learned.answer, disturbance, learned.memory.recent()
+    def __init__(self, learned: Learned) -> None:
+        self.answer, self.memory = learned.answer, learned.memory
 
-    def __call__(self, sensors: Floats, episodes: Integers, steps: Integers) -> Floats:
-        """Commands `[B, m]` for the true readings `[B, n]`."""
-        return self.answer(self.recent(self.disturbance(sensors, episodes, steps), episodes, steps))
+    def start(self, episodes: Integers) -> Tensor:
+        """See `sim.Controller`."""
+        return self.memory.start(len(episodes))
+
+    def step(self, readings: Floats, state: Tensor) -> tuple[Floats, Tensor]:
+        """Commands `[B, m]` for readings `[B, n]`."""
+        seen, state = self.memory.step(readings, state)
+        return self.answer(seen), state
+
+
+class OfWindows(Encoder):
+    """A `History` that is given windows instead of readings: trees and programs of this study learn from the same."""
+
+    name = "of_windows"
+
+    def __init__(self, history: History) -> None:
+        super().__init__()
+        self.history = history
+        self.vsa, self.sensors, self.discrete = history.vsa, history.width, history.discrete
+        self._own(None)
+
+    def own_layout(self) -> dict[str, Any]:
+        """Nothing of its own."""
+        return {}
+
+    def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
+        return {}
+
+    def config(self) -> dict[str, Any]:
+        """See `Part.config`."""
+        return {"name": self.name, "history": self.history.config()}
+
+    def cells(self, x: Tensor) -> Tensor:
+        """See `Encoder.cells`."""
+        return self.history.cells(x)
+
+    def encode(self, cells: Tensor) -> Tensor:
+        """See `Encoder.encode`."""
+        return self.history.encode(cells)
+
+
+def over_windows(space: Space, lags: Sequence[int]) -> Space:
+    """The same codebooks, for windows of present and past readings."""
+    history = History(space.encoder, lags)
+    past = [replace(sensor, name=f"{sensor.name}, {lag} ago") for lag in lags for sensor in space.schema.sensors]
+    schema = Schema([*space.schema.sensors, *past], space.schema.actuators)
+    wide = Space(schema, OfWindows(history), protection=space.protect, seed=space.seed)
+    wide.results = space.results
+    return wide
 
 
 class Asked:
@@ -105,7 +152,7 @@ class Agreement:
 
 
 def compare(learned: Learned, disturbance: Disturbance, lessons: Lessons, every: int) -> Agreement:
-    """Ask the learner about every so manieth step of the recorded runs, disturbed."""
+    """Ask the learner about every `every`-th step of the recorded runs, disturbed."""
     chosen = lessons.counts & (lessons.steps % every == 0)
     seen = lessons.seen([disturbance], learned.memory).numpy()[chosen]
     levels = presets.schema()
@@ -138,7 +185,7 @@ def best(study: Study, candidates: Mapping[str, Callable[[], Learned]]) -> Learn
 def _program(study: Study, memory: Memory) -> Learned:
     """One hypervector, shown disturbed demonstrations."""
     shown = study.shown.demonstrations(study.disturbances, memory)
-    space = RememberingSpace(study.space, memory.lags) if memory.lags else study.space
+    space = over_windows(study.space, memory.lags) if memory.lags else study.space
     rule = Gradient(passes=study.config["passes"], seed=study.config["seed"])
     with no_convergence_warnings():  # disturbed readings contradict each other; the study reports the agreement
         return Learned(Asked(rule.fit(space, shown), shown), memory)

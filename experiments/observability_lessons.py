@@ -13,9 +13,9 @@ from torch import Tensor
 
 import sim
 from behaviours import Demonstrations
-from behaviours.remembering import Recent, windows
 from experiments.lessons import shown_in
 from experiments.observability_disturbances import Disturbance, Floats, Integers, mixed
+from torchvsa.encoders.history import no_past, window, windows
 
 
 @dataclass(frozen=True)
@@ -25,9 +25,14 @@ class Memory:
     lags: tuple[int, ...] = ()
     hold: bool = False
 
-    def recent(self) -> Recent:
-        """The memory of robots that drive."""
-        return Recent(self.lags, self.hold)
+    def start(self, robots: int) -> Tensor:
+        """The past of robots that have seen nothing yet, `[robots, past, n]`."""
+        return no_past(robots, len(sim.SENSORS), self.lags, self.hold)
+
+    def step(self, readings: Floats, past: Tensor) -> tuple[Floats, Tensor]:
+        """Windows `[B, w]` for readings `[B, n]`, and the past of the next step."""
+        seen, past = window(torch.from_numpy(readings), past, self.lags, self.hold)
+        return seen.numpy(), past
 
     def __str__(self) -> str:
         steps = "step" if self.lags == (1,) else "steps"
@@ -59,7 +64,7 @@ class Lessons:
 
     def seen(self, disturbances: Sequence[Disturbance], memory: Memory) -> Float64[Tensor, "N w"]:
         """What a learner with that memory sees of them; the disturbances take turns, one an episode."""
-        disturbed = mixed(disturbances, self.readings, self.episodes, self.steps)
+        disturbed = mixed(disturbances, self.readings, self.episodes)
         return windows(torch.from_numpy(disturbed), torch.from_numpy(self.episodes), memory.lags, memory.hold)
 
     def demonstrations(self, disturbances: Sequence[Disturbance], memory: Memory) -> Demonstrations:

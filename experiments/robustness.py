@@ -44,14 +44,16 @@ class Shared:
     def __init__(self, copies: Sequence[Damaged]) -> None:
         self.copies = copies
 
-    def __call__(self, sensors: Floats, episodes: NDArray[np.int64], steps: NDArray[np.int64]) -> Floats:
+    def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The state is the index of each robot's copy, `[B]`."""
+        return episodes % len(self.copies)
+
+    def step(self, readings: Floats, state: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
         """Commands `[B, 2]` for readings `[B, 3]`."""
-        commands = np.empty((len(sensors), len(sim.ACTUATORS)))
-        for index, copy in enumerate(self.copies):
-            own = episodes % len(self.copies) == index
-            if own.any():
-                commands[own] = copy(sensors[own], episodes[own], steps[own])
-        return commands
+        commands = np.empty((len(readings), len(sim.ACTUATORS)))
+        for index in np.unique(state).tolist():
+            commands[state == index] = self.copies[index](readings[state == index])
+        return commands, state
 
 
 @dataclass(frozen=True)

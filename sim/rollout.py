@@ -7,39 +7,27 @@ from concurrent.futures import Executor, ProcessPoolExecutor, as_completed
 from contextlib import nullcontext
 from dataclasses import dataclass, fields
 from multiprocessing import get_context
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sim.checks import whole_number
+from sim.columns import EpisodeColumns, StepColumns
+from sim.controller import Controller, Policy, advance, append, as_controller, begin
 from sim.corral import Arena, find_arena
-from sim.fleet import Fleet, State, check_commands, control_steps
+from sim.fleet import Fleet, check_commands, control_steps
 from sim.result import Rollout, Steps
-from sim.robot import ACTUATORS, CONTROL_HZ, find_body
-from sim.sensors import SENSORS
+from sim.robot import ACTUATORS, find_body
+from sim.state import rows_of
 from sim.tracker import DWELL_SECONDS, Tracker
-
-
-class Policy(Protocol):
-    """Whatever turns readings into commands. For several workers it must be picklable."""
-
-    def __call__(
-        self, sensors: NDArray[np.float64], episodes: NDArray[np.int64], steps: NDArray[np.int64], /
-    ) -> NDArray[np.float64]:
-        """Commands `[B, 2]` for readings `[B, 3]`; `episodes` and `steps` `[B]` say whose readings they are.
-
-        A random or stateful policy that keys what it draws or keeps by episode and step is the same at any batch
-        size. Rows are independent robots, and their number changes from tick to tick.
-        """
-        ...
 
 
 @dataclass(frozen=True)
 class _Task:
     """What a worker needs to drive a run of episodes."""
 
-    policy: Policy
+    controller: Controller
     arena: Arena
     body: str
     seed: int
@@ -70,7 +58,8 @@ def rollout(
     `executor` (as long as the policy's rows do not depend on each other).
 
     Args:
-        policy: readings `[B, 3]`, episodes `[B]`, steps `[B]` -> commands `[B, 2]`; see `Policy`.
+        policy: a function or `nn.Module` from readings `[B, 3]` to commands `[B, 2]` (an array, a tensor, or an object
+            with `.commands`), or a `Controller`, which has a memory.
         arena: a name in `sim.ARENAS`, or an `Arena`.
         body: a name in `sim.BODIES`.
         episodes: distinct numbers, 0 or more; each stands for one start and one sequence of wheel noise.
@@ -92,7 +81,8 @@ def rollout(
     robots, workers = whole_number("robots", robots, 1), whole_number("workers", workers, 1)
     seed = whole_number("seed", seed)
     find_body(body)
-    task = _Task(policy, find_arena(arena), body, seed, control_steps(seconds), control_steps(dwell), robots, record)
+    driver, where = as_controller(policy), find_arena(arena)
+    task = _Task(driver, where, body, seed, control_steps(seconds), control_steps(dwell), robots, record)
     if executor is None and workers == 1:
         parts = [_drive(task, numbers, progress)]
     else:
@@ -158,8 +148,8 @@ def _drive(
     """Drive the episodes in this process; columns per episode, and per control step under `row_...`."""
     size = min(task.robots, len(numbers))
     tracker = Tracker(size, task.dwell_steps)
-    episodes = _Episodes(numbers)
-    rows = _Rows(task.record)
+    episodes = EpisodeColumns(numbers)
+    rows = StepColumns(task.record)
     with Fleet(size, task.arena, task.body, task.seed) as fleet:
         place = np.arange(size)  # the position in `numbers` of each slot's episode
         for slot in range(size):
@@ -167,6 +157,7 @@ def _drive(
             episodes.start[slot] = start.x, start.y, start.heading
         waiting = size
         slots = np.arange(size)
+        memory = begin(task.controller, numbers[:size])
         while slots.size:
             state = fleet.observe(slots.tolist())
             tracker.observe(slots, state)
@@ -174,11 +165,14 @@ def _drive(
             for slot in slots[done].tolist():
                 episodes.finish(int(place[slot]), tracker, slot)
             going = slots[~done]
+            if going.size < slots.size:
+                memory = rows_of(memory, np.flatnonzero(~done))
             if going.size:
                 sensors, step = state.sensors[~done], tracker.clock[going]
-                # The policy gets a copy: what it does to its readings must not change the record.
-                answer = task.policy(sensors.copy(), numbers[place[going]], step.copy())
-                commands = _check(answer, numbers[place[going]], step)
+                driven = numbers[place[going]]
+                where = f"episode {driven[0]}, step {step[0]}"
+                answer, memory = advance(task.controller, sensors, memory, where)
+                commands = _check(answer, driven, step)
                 reached = tracker.first[going] >= 0
                 contact, at_lamp = state.contact[~done], state.at_lamp[~done]
                 episodes.count(place[going], contact, at_lamp, reached)
@@ -192,7 +186,11 @@ def _drive(
                 episodes.start[waiting] = start.x, start.y, start.heading
                 place[slot] = waiting
                 waiting += 1
-            slots = np.sort(np.concatenate([going, refilled]))
+            slots = np.concatenate([going, refilled])
+            if refilled.size:
+                order = np.argsort(slots)
+                slots = slots[order]
+                memory = rows_of(append(task.controller, memory, numbers[place[refilled]]), order)
             if progress is not None and finished.size:
                 progress(int(finished.size))
     return episodes.columns() | rows.columns()
@@ -213,84 +211,3 @@ def _check(answer: object, episodes: NDArray[np.int64], steps: NDArray[np.int64]
             "expected finite numbers"
         )
     return commands
-
-
-class _Episodes:
-    """Columns of one row per episode, filled as episodes end."""
-
-    def __init__(self, numbers: NDArray[np.int64]) -> None:
-        size = len(numbers)
-        self.episode = numbers
-        self.success = np.zeros(size, dtype=np.bool_)
-        self.escaped = np.zeros(size, dtype=np.bool_)
-        self.time_to_light = np.full(size, np.nan)
-        self.steps = np.zeros(size, dtype=np.int64)
-        self.start = np.zeros((size, 3))
-        self._contacts = np.zeros(size, dtype=np.int64)
-        self._at_lamp = np.zeros(size, dtype=np.int64)
-        self._reached = np.zeros(size, dtype=np.int64)
-
-    def count(
-        self,
-        places: NDArray[np.int64],
-        contact: NDArray[np.bool_],
-        at_lamp: NDArray[np.bool_],
-        reached: NDArray[np.bool_],
-    ) -> None:
-        self._contacts[places] += contact
-        self._at_lamp[places] += at_lamp
-        self._reached[places] += reached
-
-    def finish(self, place: int, tracker: Tracker, slot: int) -> None:
-        self.success[place] = tracker.success[slot]
-        self.escaped[place] = tracker.escaped[slot]
-        self.steps[place] = tracker.clock[slot]
-        if tracker.first[slot] >= 0:
-            self.time_to_light[place] = tracker.first[slot] / CONTROL_HZ
-
-    def columns(self) -> dict[str, NDArray[Any]]:
-        dwell = np.full(len(self.episode), np.nan)
-        np.divide(self._at_lamp, self._reached, out=dwell, where=self._reached > 0)
-        return {
-            "episode": self.episode,
-            "success": self.success,
-            "escaped": self.escaped,
-            "time_to_light": self.time_to_light,
-            "steps": self.steps,
-            "dwell": dwell,
-            "collisions": self._contacts / self.steps,
-            "start": self.start,
-        }
-
-
-class _Rows:
-    """Columns of one row per control step, gathered tick by tick."""
-
-    def __init__(self, record: bool) -> None:
-        self._record = record
-        self._ticks: list[tuple[NDArray[Any], ...]] = []
-
-    def add(
-        self,
-        places: NDArray[np.int64],
-        step: NDArray[np.int64],
-        state: State,
-        chosen: NDArray[np.bool_],
-        commands: NDArray[np.float64],
-        reached: NDArray[np.bool_],
-    ) -> None:
-        if self._record:
-            seen = (state.x, state.y, state.heading, state.sensors)
-            touch = (state.contact, state.at_lamp)
-            before, after = (tuple(column[chosen] for column in group) for group in (seen, touch))
-            self._ticks.append((places, step, *before, commands.copy(), *after, reached))
-
-    def columns(self) -> dict[str, NDArray[Any]]:
-        names = ("step", "x", "y", "heading", "sensors", "commands", "contact", "at_lamp", "reached")
-        if not self._ticks:
-            shapes = {"sensors": (0, len(SENSORS)), "commands": (0, len(ACTUATORS))}
-            kinds: dict[str, Any] = {"step": np.int64} | dict.fromkeys(names[-3:], np.bool_)
-            return {f"row_{name}": np.zeros(shapes.get(name, 0), kinds.get(name, np.float64)) for name in names}
-        places, *columns = (np.concatenate(column) for column in zip(*self._ticks, strict=True))
-        order = np.lexsort((columns[0], places))
-        return {f"row_{name}": column[order] for name, column in zip(names, columns, strict=True)}

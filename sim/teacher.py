@@ -5,8 +5,6 @@ Source: the corral-escape rules that Neubert et al. 2016 print in section IV, af
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -49,6 +47,6 @@ class Teacher:
         dark = np.where(obstacle, 3, 4)
         return np.where(left, np.where(right, 0, 1), np.where(right, 2, dark)).astype(np.int64)
 
-    def __call__(self, sensors: NDArray[np.float64], *_: Any) -> NDArray[np.float64]:
-        """Commands `[B, 2]` for `sensors` `[B, 3]`; whatever else a policy is told is not needed."""
+    def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Commands `[B, 2]` for `sensors` `[B, 3]`."""
         return COMMANDS[self.rule(sensors)]

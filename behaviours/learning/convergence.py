@@ -8,6 +8,8 @@ from types import FrameType
 
 _MANY = 0.05
 """The share of contradicting rows from which on they are named; fewer hardly explain what is wrong."""
+FEW = 0.05
+"""The share of pairs that rules which fit approximately may leave wrong without a word: noise in the data is usual."""
 
 
 class ConvergenceWarning(UserWarning):
@@ -15,7 +17,15 @@ class ConvergenceWarning(UserWarning):
 
 
 def warn_if_wrong(
-    rule: str, wrong: int, pairs: int, *, contradicting: int, samples: int, after: str, remedy: str
+    rule: str,
+    wrong: int,
+    pairs: int,
+    *,
+    contradicting: int,
+    samples: int,
+    after: str,
+    remedy: str,
+    tolerated: float = 0.0,
 ) -> None:
     """Warn if the program recalls `wrong` of its `pairs` wrongly, pointing at the line outside of this package.
 
@@ -27,8 +37,9 @@ def warn_if_wrong(
         samples: all samples.
         after: how long it was trained, for the message.
         remedy: what helps where (nearly) nothing contradicts.
+        tolerated: the share of pairs that may be wrong without a warning.
     """
-    if not wrong:
+    if wrong <= tolerated * pairs:
         return
     if contradicting >= _MANY * samples:
         cause = (

@@ -12,7 +12,7 @@ from torch.nn import functional
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule, grown
-from behaviours.learning.convergence import warn_if_wrong
+from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import flag, number, store, whole
 from behaviours.progress import Progress, between, silent
@@ -146,6 +146,7 @@ class Gradient(Rule):
             samples=report.samples,
             after=f" after {passes} passes",
             remedy="more dimensions (dim), more passes or another learning_rate",
+            tolerated=FEW,
         )
         return grown(before, Behaviour(space, program, samples.known(space.vsa), samples.results, report))
 

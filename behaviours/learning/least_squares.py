@@ -10,7 +10,7 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
-from behaviours.learning.convergence import warn_if_wrong
+from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import number, store
 from behaviours.progress import Progress, between, silent
@@ -75,6 +75,7 @@ class LeastSquares(Rule):
             samples=report.samples,
             after="",
             remedy="more dimensions (dim) or a smaller ridge",
+            tolerated=FEW,
         )
         return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
 

@@ -42,7 +42,7 @@ def test_all_combinations_are_asked_the_default_first() -> None:
 
 def lesson(readings: np.ndarray) -> Lesson:
     rows = np.arange(len(readings))
-    return Lesson(readings, sim.Teacher()(readings), rows // 20, rows % 20)
+    return Lesson(readings, sim.Teacher()(readings), rows // 20)
 
 
 READINGS = np.random.default_rng(5).uniform([0, 0, 0], [s[2] for s in sim.SENSORS], (120, 3))

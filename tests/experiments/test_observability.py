@@ -13,8 +13,8 @@ import sim
 from behaviours import Demonstrations
 from experiments.observability import check
 from experiments.observability_curves import curves
-from experiments.observability_disturbances import DISTURBANCES, HIGH, LOW, Disturbance
-from experiments.observability_learners import Asked, Learned, Study, Through, best, compare
+from experiments.observability_disturbances import DISTURBANCES, HIGH, LOW, Disturbance, Disturbed
+from experiments.observability_learners import Asked, Learned, Remembering, Study, best, compare
 from experiments.observability_lessons import Lessons, Memory
 from experiments.observability_report import mean_over, sentences
 
@@ -35,8 +35,10 @@ def test_an_undisturbed_teacher_drives_as_the_teacher() -> None:
         assert seen.shape[1] == 9  # now, and 1 and 4 steps ago
         return sim.Teacher()(seen[:, :3])
 
-    own, through = drive(sim.Teacher()), drive(Through(Learned(of_the_present, Memory((1, 4))), undisturbed))
-    np.testing.assert_array_equal(own.trajectory.sensors, through.trajectory.sensors)
+    own = drive(sim.Teacher())
+    for seen in (sim.Teacher(), Remembering(Learned(of_the_present, Memory((1, 4))))):
+        through = drive(Disturbed(undisturbed, seen))
+        np.testing.assert_array_equal(own.trajectory.sensors, through.trajectory.sensors)
 
 
 def lessons(commands: list[list[float]], counts: list[bool] | None = None) -> Lessons:
@@ -89,7 +91,7 @@ def test_a_robot_that_senses_nothing_does_what_it_was_shown_most_often() -> None
 def test_demonstrations_leave_out_moments_without_any_reading() -> None:
     shown = lessons([STRAIGHT] * 400)
     lost = DISTURBANCES["missing"](0.7, 0)
-    seen = lost(shown.readings, shown.episodes, shown.steps)
+    seen = sim.replay(lost, shown.readings, shown.episodes)
     found = shown.demonstrations([lost], Memory((1,)))
     blind = np.isnan(seen).sum(1) == seen.shape[1]
     # With a memory of one step, what is lost now and before is lost.

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import sim
 from experiments.observability_disturbances import DISTURBANCES, HIGH, LOW, Stuck, mixed
 
 
@@ -17,47 +18,51 @@ def recording(episodes: int = 6, steps: int = 80) -> tuple[Any, Any, Any]:
 
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_strength_0_changes_nothing_and_the_strongest_does(name: str) -> None:
-    readings, episodes, steps = recording()
-    np.testing.assert_array_equal(DISTURBANCES[name](0, 0)(readings, episodes, steps), readings)
-    assert not np.array_equal(DISTURBANCES[name](1, 0)(readings, episodes, steps), readings)
+    readings, episodes, _ = recording()
+    np.testing.assert_array_equal(sim.replay(DISTURBANCES[name](0, 0), readings, episodes), readings)
+    assert not np.array_equal(sim.replay(DISTURBANCES[name](1, 0), readings, episodes), readings)
 
 
 @pytest.mark.parametrize("name", DISTURBANCES)
 def test_an_episode_is_disturbed_in_the_same_way_in_any_batch_and_any_copy(name: str) -> None:
     readings, episodes, steps = recording()
-    expected = DISTURBANCES[name](1 if name in ("delayed", "aliased") else 0.5, 4)(readings, episodes, steps)
+    expected = sim.replay(DISTURBANCES[name](1 if name in ("delayed", "aliased") else 0.5, 4), readings, episodes)
     disturbance = pickle.loads(pickle.dumps(DISTURBANCES[name](1 if name in ("delayed", "aliased") else 0.5, 4)))
     found = np.zeros_like(readings)
-    for step in range(80):
-        rows = np.flatnonzero(steps == step)[::-1]
-        found[rows] = disturbance(readings[rows], episodes[rows], steps[rows])
-    np.testing.assert_array_equal(found, expected)
+    # The episodes backwards, one at a time and all together.
+    for group in (np.unique(episodes)[::-1], *np.unique(episodes)[:, None]):
+        state = disturbance.start(group)
+        for step in range(80):
+            rows = [np.flatnonzero((steps == step) & (episodes == episode))[0] for episode in group]
+            found[rows], state = disturbance.step(readings[rows], state)
+        own = np.isin(episodes, group)
+        np.testing.assert_array_equal(found[own], expected[own])
 
 
 def test_the_share_of_missing_readings_is_the_one_asked_for_and_all_else_arrives() -> None:
-    readings, episodes, steps = recording(40, 300)
-    seen = DISTURBANCES["missing"](0.3, 0)(readings, episodes, steps)
+    readings, episodes, _ = recording(40, 300)
+    seen = sim.replay(DISTURBANCES["missing"](0.3, 0), readings, episodes)
     lost = np.isnan(seen)
     # Four standard deviations of the share of 36,000 independent losses.
     assert abs(lost.mean() - 0.3) < 4 * (0.3 * 0.7 / lost.size) ** 0.5
     np.testing.assert_array_equal(seen[~lost], readings[~lost])
-    stronger = np.isnan(DISTURBANCES["missing"](0.6, 0)(readings, episodes, steps))
+    stronger = np.isnan(sim.replay(DISTURBANCES["missing"](0.6, 0), readings, episodes))
     assert (stronger | ~lost).all()
 
 
 @pytest.mark.parametrize("delay", [1, 5])
 def test_a_delayed_reading_is_the_one_so_many_steps_before(delay: int) -> None:
     readings, episodes, steps = recording()
-    seen = DISTURBANCES["delayed"](delay, 0)(readings, episodes, steps)
+    seen = sim.replay(DISTURBANCES["delayed"](delay, 0), readings, episodes)
     rows = np.arange(len(readings))
     np.testing.assert_array_equal(seen, readings[rows - np.minimum(steps, delay)])
 
 
 def test_a_stuck_sensor_repeats_one_reading_from_its_onset_on() -> None:
-    readings, episodes, steps = recording(5, 300)
+    readings, episodes, _ = recording(5, 300)
     disturbance = DISTURBANCES["stuck"](0.5, 2)
     assert isinstance(disturbance, Stuck)
-    seen = disturbance(readings, episodes, steps)
+    seen = sim.replay(disturbance, readings, episodes)
     onsets = np.array([disturbance.onset(episode) for episode in np.unique(episodes)])
     assert np.isfinite(onsets).any()
     assert np.isinf(onsets).any()
@@ -71,16 +76,16 @@ def test_a_stuck_sensor_repeats_one_reading_from_its_onset_on() -> None:
 def test_noise_has_the_asked_spread_and_stays_in_range() -> None:
     _, episodes, steps = recording(30, 200)
     readings = np.tile((LOW + HIGH) / 2, (len(steps), 1))
-    seen = DISTURBANCES["noisy"](0.05, 0)(readings, episodes, steps)
+    seen = sim.replay(DISTURBANCES["noisy"](0.05, 0), readings, episodes)
     np.testing.assert_allclose((seen - readings).std(0), 0.05 * (HIGH - LOW), rtol=0.05)
-    rough = DISTURBANCES["noisy"](1, 0)(readings, episodes, steps)
+    rough = sim.replay(DISTURBANCES["noisy"](1, 0), readings, episodes)
     assert (rough >= LOW).all()
     assert (rough <= HIGH).all()
 
 
 def test_disturbances_take_turns_by_episode() -> None:
-    readings, episodes, steps = recording(4)
-    seen = mixed([DISTURBANCES["aliased"](0, 0), DISTURBANCES["aliased"](4, 0)], readings, episodes, steps)
+    readings, episodes, _ = recording(4)
+    seen = mixed([DISTURBANCES["aliased"](0, 0), DISTURBANCES["aliased"](4, 0)], readings, episodes)
     gone = np.isnan(seen)
     assert not gone[(episodes == 3) | (episodes == 5)].any()
     assert gone[(episodes == 4) | (episodes == 6)][:, :2].all()

@@ -105,8 +105,8 @@ def test_no_damage_changes_nothing(name: str, part: str) -> None:
 def test_a_damaged_learner_drives_as_it_was_examined(name: str, part: str, kind: str) -> None:
     one, what = learner(name), damage(kind, 0.4)
     asked = one.commands(part, what, READINGS)
-    policy, nothing = one.damaged(part, what), np.zeros(1, dtype=np.int64)
-    alone = np.concatenate([policy(row[None], nothing, nothing) for row in READINGS[:150]])
+    policy = one.damaged(part, what)
+    alone = np.concatenate([policy(row[None]) for row in READINGS[:150]])
     assert np.array_equal(alone, asked[:150])
 
 
@@ -176,8 +176,7 @@ def test_the_elements_of_the_others_are_all_their_parameters(name: str) -> None:
 def test_copies_share_the_starts() -> None:
     one = learner("default")
     copies = [one.damaged("program", damage("flip", 0.5, 0, draw)) for draw in range(2)]
-    episodes = np.arange(len(READINGS))
-    together = Shared(copies)(READINGS, episodes, episodes)
+    together = sim.replay(Shared(copies), READINGS, np.arange(len(READINGS)))
     assert np.array_equal(together[0::2], copies[0](READINGS[0::2]))
     assert np.array_equal(together[1::2], copies[1](READINGS[1::2]))
     assert (together[0::2] != copies[1](READINGS[0::2])).any()

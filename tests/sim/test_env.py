@@ -76,7 +76,7 @@ def test_vector_and_scalar_agree_step_by_step() -> None:
     assert np.array_equal(seen, alone)
     teacher, over, ended, episodes = sim.Teacher(), [False] * 3, 0, [0, 1, 2]
     for step in range(500):
-        actions = teacher(seen) if step % 7 else policies.random(seen, np.arange(3), np.full(3, step))
+        actions = teacher(seen) if step % 7 else policies.random.commands(seen, np.arange(3), np.full(3, step))
         seen, rewards, terminated, truncated, infos = vector.step(actions)
         for i, env in enumerate(scalars):
             if over[i]:

@@ -76,11 +76,12 @@ def test_every_controller_meets_the_same_starts() -> None:
 
 def test_every_controller_meets_the_same_wheel_noise() -> None:
     # Two policies that differ only after the first second move alike until then.
-    def late(sensors: np.ndarray, episodes: np.ndarray, steps: np.ndarray) -> np.ndarray:
-        return np.where(steps[:, None] < 20, 1.0, -1.0) * np.ones((1, 2))
+    class Late(policies.Counting):
+        def commands(self, readings: np.ndarray, episodes: np.ndarray, steps: np.ndarray) -> np.ndarray:
+            return np.where(steps[:, None] < 20, 1.0, -1.0) * np.ones((1, 2))
 
     a = sim.rollout(policies.forward, episodes=[3], seconds=2.0).trajectory
-    b = sim.rollout(late, episodes=[3], seconds=2.0).trajectory
+    b = sim.rollout(Late(), episodes=[3], seconds=2.0).trajectory
     assert np.array_equal(a.x[:21], b.x[:21])
     assert not np.array_equal(a.x[:22], b.x[:22])
 
@@ -190,7 +191,7 @@ def test_an_episode_that_times_out_on_its_way_fails() -> None:
 
 
 def test_commands_beyond_full_speed_are_clipped_but_recorded_as_given() -> None:
-    def excessive(sensors: np.ndarray, episodes: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    def excessive(sensors: np.ndarray) -> np.ndarray:
         return np.full((len(sensors), 2), 5.0)
 
     fast = sim.rollout(excessive, episodes=[2], seconds=2.0).trajectory
@@ -200,9 +201,8 @@ def test_commands_beyond_full_speed_are_clipped_but_recorded_as_given() -> None:
 
 
 def test_a_policy_cannot_change_the_record() -> None:
-    def vandal(sensors: np.ndarray, episodes: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    def vandal(sensors: np.ndarray) -> np.ndarray:
         sensors[:] = -1.0
-        steps[:] = 99
         return np.zeros((len(sensors), 2))
 
     path = sim.rollout(vandal, episodes=range(3), seconds=0.5).trajectory
@@ -218,7 +218,7 @@ def test_nan_names_episode_and_step() -> None:
 @pytest.mark.parametrize("answer", [lambda s: np.ones(2), lambda s: np.ones((len(s), 3)), lambda s: "left"])
 def test_wrong_answers_name_episode_and_step(answer: Callable[[np.ndarray], Any]) -> None:
     with pytest.raises(ValueError, match=r"episode 4, step 0: "):
-        sim.rollout(lambda sensors, episodes, steps: answer(sensors), episodes=[4, 5, 6])
+        sim.rollout(answer, episodes=[4, 5, 6])
 
 
 def test_a_policy_that_breaks_leaves_no_client() -> None:

@@ -57,11 +57,6 @@ def test_the_answer_may_be_changed_without_changing_the_teacher() -> None:
     assert sim.Teacher()(sensors).tolist() == [[1, 1], [1, 1]]
 
 
-def test_it_drives_as_a_policy_with_episodes_and_steps() -> None:
-    sensors = np.array([[LIGHT_MAX, LIGHT_MAX, 0.1]])
-    assert sim.Teacher()(sensors, np.array([3]), np.array([0])).tolist() == [[-1, 1]]
-
-
 @pytest.mark.parametrize("shape", [(3,), (2, 2), (1, 2, 3)])
 def test_wrong_shapes_are_named(shape: tuple[int, ...]) -> None:
     with pytest.raises(ValueError, match=r"expected \[B, 3\] \(light_left, light_right, distance\)"):

@@ -40,7 +40,7 @@ class History(Encoder):
         if isinstance(present, History):
             raise ValueError("a history of histories is not supported; give all lags at once")
         self.present = planned(present)
-        self.lags, self.hold = _checked(lags), bool(hold)
+        self.lags, self.hold = check_lags(lags), bool(hold)
         self.vsa, self.sensors, self.discrete = present.vsa, present.sensors, present.discrete
         self._own(seed)
 
@@ -91,17 +91,28 @@ class History(Encoder):
 
     def start(self, batch: int) -> Float[Tensor, "batch past n"]:
         """No past: all of it NaN."""
-        past = max(self.lags, default=0) + (1 if self.hold and not self.lags else 0)
-        return torch.full((batch, past, self.sensors), torch.nan, dtype=torch.float64)
+        return no_past(batch, self.sensors, self.lags, self.hold)
 
     def step(
         self, x: Float[Tensor, "batch n"], past: Float[Tensor, "batch past n"]
     ) -> tuple[Float[Tensor, "batch w"], Float[Tensor, "batch past n"]]:
         """The window of these readings, and the past of the next step."""
-        if self.hold:
-            x = torch.where(x.isnan(), past[:, 0], x)
-        kept = torch.cat([x[:, None].to(past.dtype), past], 1)
-        return kept[:, [0, *self.lags]].flatten(1), kept[:, :-1]
+        return window(x, past, self.lags, self.hold)
+
+
+def no_past(batch: int, sensors: int, lags: Sequence[int], hold: bool = False) -> Float[Tensor, "batch past n"]:
+    """What is remembered before the first step: NaN. The latest readings come first."""
+    return torch.full((batch, max(lags, default=int(hold)), sensors), torch.nan, dtype=torch.float64)
+
+
+def window(
+    x: Float[Tensor, "batch n"], past: Float[Tensor, "batch past n"], lags: Sequence[int], hold: bool = False
+) -> tuple[Float[Tensor, "batch w"], Float[Tensor, "batch past n"]]:
+    """The window of these readings after `past`, and the past of the next step; see `History.step`."""
+    if hold:
+        x = torch.where(x.isnan(), past[:, 0], x)
+    seen = torch.cat([x[:, None].to(past.dtype), past], 1)
+    return seen[:, [0, *lags]].flatten(1), seen[:, : past.shape[1]]
 
 
 def windows(
@@ -115,7 +126,7 @@ def windows(
     if hold:
         x = _held(x, begins)
     columns = [x]
-    for lag in _checked(lags):
+    for lag in check_lags(lags):
         past = torch.full_like(x, torch.nan)
         if lag < len(x):
             same = (episodes[lag:] == episodes[:-lag])[:, None]
@@ -134,7 +145,7 @@ def _held(x: Tensor, begins: Tensor) -> Tensor:
     return x.gather(0, source)
 
 
-def _checked(lags: Sequence[int]) -> tuple[int, ...]:
+def check_lags(lags: Sequence[int]) -> tuple[int, ...]:
     """The lags as a tuple. Raises `ValueError` unless they are whole numbers of steps, 1 or more, growing."""
     given = tuple(lags)
     if any(isinstance(lag, bool) or not isinstance(lag, int) or lag < 1 for lag in given) or any(
