@@ -53,7 +53,7 @@ class Record(Encoder):
         # One value encoder given for several sensors stays one.
         copies = {id(value): planned(value) for value in given}
         self.values = nn.ModuleList([copies[id(value)] for value in given])
-        self.discrete = all(value.discrete for value in self._values)
+        self.discrete = all(value.discrete for value in copies.values())
         self.register_buffer("table", None, persistent=False)
         self._own(seed)
 
@@ -158,7 +158,7 @@ class Record(Encoder):
     # -- codebooks ----------------------------------------------------------------------------------------
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
-        bins = max(getattr(value, "bins", 0) for value in self._values)
+        bins = max(getattr(value, "bins", 0) for value in self.values)
         require_memory(
             2 * self.sensors * (bins + 1) * self.vsa.row_bytes,
             f"a record of {self.sensors:,} sensors with {bins:,} bins at d = {self.vsa.dim:,}",
