@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import torch
 from jaxtyping import Bool, Float, Int64, Shaped
@@ -14,6 +14,8 @@ from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Binned, Encoder, ValueEncoder, planned, whole
 from torchvsa.encoders.registry import value_encoder
 from torchvsa.part import Layout, Part
+
+R = TypeVar("R", bound="Record")
 
 
 class Record(Encoder):
@@ -99,7 +101,7 @@ class Record(Encoder):
         return {"name": self.name, "values": values[0] if self.shared else values, "sensors": self.sensors}
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any], vsa: VSA) -> Self:
+    def from_config(cls: type[R], config: Mapping[str, Any], vsa: VSA) -> R:
         """See `Part.from_config`."""
         options = {key: value for key, value in config.items() if key not in ("name", "values")}
         given = config["values"]

@@ -51,7 +51,7 @@ class ThresholdFeatures(Encoder):
         sensors: int,
         bins: int = 32,
         subset: int | None = None,
-        edges: int | Sequence[Float64[Tensor, "edges"]] | None = None,
+        edges: int | Sequence[Float[Tensor, "_"]] | None = None,
         seed: int | None = None,
     ) -> None:
         super().__init__()

@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 import torch
+from jaxtyping import TypeCheckError
 from torch import Tensor
 from torch.testing import assert_close
 
@@ -33,10 +34,10 @@ def same(a: Tensor, b: Tensor) -> None:
 
 
 def refuses(error: type[Exception], call: Callable[[], object]) -> None:
-    """Raise `AssertionError` unless the call raises this error."""
+    """Raise `AssertionError` unless the call raises this error, or a checker of annotations raises its own before."""
     try:
         call()
-    except error:
+    except (error, TypeCheckError):
         return
     raise AssertionError(f"no {error.__name__} was raised")
 
