@@ -2,13 +2,15 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import torch
 from torch import Tensor, nn
 
 from torchvsa.architectures import VSA
 
+P = TypeVar("P", bound="Part")
+"""Not `typing.Self`, which checkers of annotations at run time do not take in methods."""
 Layout = dict[str, tuple[torch.dtype, tuple[int, ...]]]
 """Tensors by name: their types and shapes."""
 
@@ -51,7 +53,7 @@ class Part(nn.Module, ABC):
         """Its name and plain values from which `from_config` makes an equal plan."""
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any], vsa: VSA) -> Self:
+    def from_config(cls: type[P], config: Mapping[str, Any], vsa: VSA) -> P:
         """The inverse of `config`: a plan, without codebooks."""
         return cls(vsa, **{key: value for key, value in config.items() if key != "name"})  # type: ignore[call-arg]
 
@@ -82,7 +84,7 @@ class Part(nn.Module, ABC):
             layout |= {f"{name}.{key}": wanted for key, wanted in part.layout().items()}
         return layout
 
-    def draw(self, generator: torch.Generator | None = None) -> Self:
+    def draw(self: P, generator: torch.Generator | None = None) -> P:
         """Draw all codebooks that are not there yet."""
         for name, tensor in self._draw(generator).items():
             setattr(self, name, tensor)
@@ -96,7 +98,7 @@ class Part(nn.Module, ABC):
             if not part.drawn:
                 part.draw(generator)
 
-    def take(self, tensors: Mapping[str, Tensor]) -> Self:
+    def take(self: P, tensors: Mapping[str, Tensor]) -> P:
         """Fill a plan with these tensors, whose layout must be `layout`. Raises `ValueError` as `check` does."""
         for name, part in self.parts().items():
             start = f"{name}."

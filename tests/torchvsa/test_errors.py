@@ -6,11 +6,24 @@ import pytest
 import torch
 
 import torchvsa
-from torchvsa import CleanUp, Record, SelfShift, ShapeError
-from torchvsa.encoding import level
+from torchvsa import CleanUp, SelfShift, ShapeError
+from torchvsa.encoders import (
+    Balanced,
+    FractionalPower,
+    History,
+    Level,
+    Lookup,
+    RandomFourier,
+    SubsetProduct,
+    Sum,
+    ThresholdFeatures,
+    encoder,
+    value_encoder,
+)
 
 SMALL = torchvsa.MAP(16)
-ROW = torch.zeros(3, dtype=torch.long)
+LOOKUP = Lookup(SMALL, 4)
+ROW = torch.zeros(3)
 
 REFUSED: dict[str, tuple[Callable[[], object], type[ValueError], list[str]]] = {
     "an unknown architecture": (lambda: torchvsa.architecture("MAP", 8), ValueError, ["'MAP'", "MAP-C", "BSC"]),
@@ -59,27 +72,83 @@ REFUSED: dict[str, tuple[Callable[[], object], type[ValueError], list[str]]] = {
         ValueError,
         ["'mean'", "'sum'", "'median'"],
     ),
-    "no span": (lambda: level(SMALL, 4, span=0), ValueError, ["span", "at least 1", "0"]),
-    "an unknown value encoder": (lambda: Record(SMALL, 2, 4, "thermo"), ValueError, ["'thermo'", "lookup", "level"]),
-    "an unknown combination": (
-        lambda: Record(SMALL, 2, 4, combine="sum"),
+    "no span": (lambda: Level(SMALL, 4, span=0), ValueError, ["span", "at least 1", "0"]),
+    "half a bin": (lambda: Balanced(SMALL, 2.5), ValueError, ["bins", "whole", "2.5"]),  # pyright: ignore[reportArgumentType]
+    "no bins": (lambda: Lookup(SMALL, 0), ValueError, ["bins", "at least 1", "0"]),
+    "an unknown value encoder": (
+        lambda: value_encoder({"name": "thermo"}, SMALL),
         ValueError,
-        ["'sum'", "bundle", "bind", "subset"],
+        ["'thermo'", "lookup", "level", "fractional_power"],
     ),
-    "no sensors": (lambda: Record(SMALL, 0, 4), ValueError, ["at least one sensor", "0 and 4"]),
-    "no levels": (lambda: Record(SMALL, 2, 0), ValueError, ["one level", "2 and 0"]),
-    "an empty subset": (
-        lambda: Record(SMALL, 2, 4, combine="subset", subset=0),
+    "an unknown encoder": (
+        lambda: encoder({"name": "bundle"}, SMALL),
         ValueError,
-        ["subset", "at least 1", "0"],
+        ["'bundle'", "sum", "product", "subset_product", "history"],
     ),
+    "no name of an encoder": (lambda: encoder({}, SMALL), ValueError, ["None", "sum", "product"]),
+    "no sensors": (lambda: Sum(LOOKUP, 0), ValueError, ["sensors", "at least 1", "0"]),
+    "a number of sensors left out": (lambda: Sum(LOOKUP), ValueError, ["one value encoder", "sensors="]),
+    "value encoders for other sensors": (lambda: Sum([LOOKUP] * 2, 3), ValueError, ["2 value encoders", "3 sensors"]),
+    "no value encoders": (lambda: Sum([]), ValueError, ["value encoder", "one per sensor"]),
+    "value encoders of two spaces": (
+        lambda: Sum([LOOKUP, Lookup(torchvsa.MAP(8), 4)]),
+        ValueError,
+        ["the same architecture"],
+    ),
+    "an empty subset": (lambda: SubsetProduct(LOOKUP, 2, 0), ValueError, ["subset", "at least 1", "0"]),
     "a subset in HRR": (
-        lambda: Record(torchvsa.HRR(8), 2, 4, combine="subset"),
+        lambda: SubsetProduct(Lookup(torchvsa.HRR(8), 4), 2),
         ValueError,
         ["subset", "element-wise", "HRR"],
     ),
-    "one row of indices": (lambda: Record(SMALL, 3, 4)(ROW), ShapeError, ["indices", "[batch, 3]", "(3,)"]),
-    "a missing sensor": (lambda: Record(SMALL, 2, 4)(ROW[None]), ShapeError, ["[batch, 2]", "(1, 3)"]),
+    "one row of readings": (lambda: Sum(LOOKUP, 3, 0)(ROW), ShapeError, ["readings", "[batch, 3]", "(3,)"]),
+    "a missing sensor": (lambda: Sum(LOOKUP, 2, 0)(ROW[None]), ShapeError, ["[batch, 2]", "(1, 3)"]),
+    "a reading out of range": (
+        lambda: Sum(LOOKUP, 2, 0)(torch.tensor([[0.5, 1], [0, 1.5]])),
+        ValueError,
+        ["[0, 1]", "1.5 at [1, 1]", "Schema.normalise"],
+    ),
+    "a plan": (lambda: Sum(LOOKUP, 3)(ROW[None]), ValueError, ["'sum'", "no codebooks", "seed", "draw()"]),
+    "a value that was not observed": (
+        lambda: Lookup(SMALL, 4, 0)(torch.tensor(torch.nan)),
+        ValueError,
+        ["not observed", "records"],
+    ),
+    "powers without a spectrum": (lambda: FractionalPower(SMALL), ValueError, ["spectrum", "FHRR, HRR", "MAP-C"]),
+    "an unknown kernel": (
+        lambda: FractionalPower(torchvsa.HRR(8), kernel="cauchy"),  # pyright: ignore[reportArgumentType]
+        ValueError,
+        ["'sinc'", "'gaussian'", "'cauchy'"],
+    ),
+    "no length": (lambda: FractionalPower(torchvsa.HRR(8), 0), ValueError, ["length", "above 0", "0"]),
+    "no width of the kernel": (lambda: RandomFourier(SMALL, 2, -1), ValueError, ["length", "above 0", "-1"]),
+    "random features of bits": (lambda: RandomFourier(torchvsa.BSC(8), 2), ValueError, ["real elements", "BSC"]),
+    "fractions in int8": (
+        lambda: RandomFourier(torchvsa.MAP(8, dtype=torch.int8), 2, sign=False),
+        ValueError,
+        ["no fractions", "sign=True", "int8"],
+    ),
+    "edges of another sensor": (
+        lambda: ThresholdFeatures(SMALL, 2, edges=[torch.tensor([0.5])]),
+        ValueError,
+        ["edges", "2 sensors", "1 of them"],
+    ),
+    "edges in disorder": (
+        lambda: ThresholdFeatures(SMALL, 1, edges=[torch.tensor([0.5, 0.2])]),
+        ValueError,
+        ["sensor 0", "sorted"],
+    ),
+    "an edge out of range": (
+        lambda: ThresholdFeatures(SMALL, 1, edges=[torch.tensor([0.5, 1.5])]),
+        ValueError,
+        ["sensor 0", "from 0 to 1"],
+    ),
+    "more edges than bins part": (
+        lambda: ThresholdFeatures(SMALL, 1, 2, edges=[torch.tensor([0.2, 0.5])]),
+        ValueError,
+        ["sensor 0", "2 edges", "has 2"],
+    ),
+    "a history of histories": (lambda: History(History(Sum(LOOKUP, 2), [1]), [2]), ValueError, ["all lags at once"]),
     "no items": (lambda: CleanUp(torch.ones(0, 4)), ShapeError, ["items", "at least 1", "(0, 4)"]),
     "one bare item": (lambda: CleanUp(torch.ones(4)), ShapeError, ["[K, d]", "(4,)"]),
     "another query": (
@@ -113,6 +182,6 @@ def test_no_architecture_takes_vectors_of_another_dimension(name: str, verb: str
 @pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
 def test_no_permutation_or_protection_takes_vectors_of_another_dimension(name: str) -> None:
     vsa, wrong = torchvsa.architecture(name, 16), torchvsa.architecture(name, 10).random(2)
-    for call in (lambda: vsa.permute(wrong, 1), lambda: SelfShift(vsa)(wrong)):
+    for call in (lambda: vsa.permute(wrong, 1), lambda: SelfShift(vsa, seed=0)(wrong)):
         with pytest.raises(ShapeError, match=r"x must end in d = 16 elements; got shape \(2, 10\)"):
             call()

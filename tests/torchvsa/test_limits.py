@@ -6,52 +6,22 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from torch import nn
 
 import torchvsa
-from torchvsa import BSC, FHRR, HRR, MAP, VSA, FixedShift, Record, SelfShift, ShapeError, Thresholds
-from torchvsa.encoding import COMBINATIONS, VALUES
-
-bounded = settings(deadline=None, derandomize=True, max_examples=60)
-ENCODERS: dict[str, Callable[[], nn.Module]] = {
-    **{name: lambda name=name: Record(MAP(20), 3, 5, combine=name) for name in COMBINATIONS},
-    "bundled bits": lambda: Record(BSC(20), 3, 5),
-    "thresholds": lambda: Thresholds(MAP(20), 3, 5),
-}
-encoders = pytest.mark.parametrize("name", ENCODERS)
-
-
-@encoders
-@bounded
-@given(data=st.data())
-def test_an_index_beyond_the_levels_is_named(name: str, data: st.DataObject) -> None:
-    encode, rows = ENCODERS[name](), data.draw(st.sampled_from([1, 4, 200]))
-    indices = torch.randint(-1, 5, (rows, 3), generator=torch.Generator().manual_seed(rows))
-    row, column = data.draw(st.integers(0, rows - 1)), data.draw(st.integers(0, 2))
-    wrong = data.draw(st.integers(-(2**63), -2) | st.integers(5, 2**63 - 1) | st.sampled_from([-2, 5, 99]))
-    encode(indices)
-    indices[row, column] = wrong
-    with pytest.raises(ValueError, match=rf"from 0 to 4; got {wrong} in row {row}, column {column}, .* sensor"):
-        encode(indices)
-
-
-@encoders
-def test_indices_are_integers_of_any_size(name: str) -> None:
-    encode = ENCODERS[name]()
-    indices = torch.tensor([[0, 4, 2], [1, 1, 3]])
-    for dtype in (torch.uint8, torch.int8, torch.int16, torch.int32):
-        assert torch.equal(encode(indices.to(dtype)), encode(indices))
-    for dtype in (torch.float32, torch.float64, torch.bool):
-        with pytest.raises(ValueError, match=f"indices must be integers .* got {dtype}"):
-            encode(indices.to(dtype))
-
-
-def test_small_types_reach_every_level() -> None:
-    encode = Record(MAP(20), 1, 300)
-    assert torch.equal(encode(torch.tensor([[-1], [127]], dtype=torch.int8)), encode(torch.tensor([[-1], [127]])))
-    assert torch.equal(encode(torch.tensor([[255]], dtype=torch.uint8)), encode(torch.tensor([[255]])))
+from torchvsa import BSC, FHRR, HRR, MAP, VSA, FixedShift, SelfShift, ShapeError
+from torchvsa.encoders import (
+    Balanced,
+    Circular,
+    FractionalPower,
+    Level,
+    Lookup,
+    Product,
+    RandomFourier,
+    SubsetProduct,
+    Sum,
+    Thermometer,
+    ThresholdFeatures,
+)
 
 
 @pytest.mark.parametrize("make", [lambda d: MAP(d), HRR, FHRR, BSC, lambda d: torchvsa.architecture("MAP-B", d)])
@@ -99,18 +69,22 @@ def test_the_name_of_a_self_shift_is_a_hypervector_of_its_space() -> None:
 
 
 HUGE = 10**14
+BINNED = (Lookup, Level, Balanced, Thermometer, Circular)
+RECORDS = (Sum, Product, SubsetProduct)
 TOO_LARGE: dict[str, Callable[[], object]] = {
     **{name: lambda name=name: torchvsa.architecture(name, HUGE).random() for name in torchvsa.ARCHITECTURES},
     "uniform atoms": lambda: MAP(HUGE, atoms="uniform").random(),
     "many vectors": lambda: MAP(1000).random(10**6, 10**6),
     "an identity": lambda: MAP(HUGE).identity(),
-    "a self-derived shift": lambda: SelfShift(MAP(HUGE)),
+    "a self-derived shift": lambda: SelfShift(MAP(HUGE), seed=0),
     "its columns": lambda: SelfShift(MAP(HUGE), h=torch.ones(1).expand(HUGE)),
-    **{f"{name} codes": lambda name=name: VALUES[name](MAP(1000), HUGE) for name in VALUES},
-    **{f"{c} of many levels": lambda c=c: Record(MAP(1000), 2, HUGE, combine=c) for c in COMBINATIONS},
-    **{f"{c} of many sensors": lambda c=c: Record(MAP(1000), HUGE, 2, combine=c) for c in COMBINATIONS},
-    "thresholds of many sensors": lambda: Thresholds(MAP(1000), HUGE, 2),
-    "thresholds of many dimensions": lambda: Thresholds(MAP(HUGE), 2, 2),
+    **{f"{kind.name} codes": lambda kind=kind: kind(MAP(1000), HUGE, seed=0) for kind in BINNED},
+    **{f"{kind.name} of many bins": lambda kind=kind: kind(Lookup(MAP(1000), HUGE), 2, seed=0) for kind in RECORDS},
+    **{f"{kind.name} of many sensors": lambda kind=kind: kind(Lookup(MAP(1000), 2), HUGE, seed=0) for kind in RECORDS},
+    "thresholds of many sensors": lambda: ThresholdFeatures(MAP(1000), HUGE, 2, seed=0),
+    "thresholds of many dimensions": lambda: ThresholdFeatures(MAP(HUGE), 2, 2, seed=0),
+    "angles of many dimensions": lambda: FractionalPower(FHRR(HUGE), seed=0),
+    "random features of many sensors": lambda: RandomFourier(MAP(1000), HUGE, seed=0),
 }
 
 
@@ -128,4 +102,4 @@ def test_what_exceeds_memory_is_refused_before_it_is_taken(name: str) -> None:
 
 def test_what_fits_is_not_refused() -> None:
     assert MAP(2**20, dtype=torch.int8).random(100).shape == (100, 2**20)
-    assert Thresholds(MAP(100), 3, 10**12).threshold.max() < 10**12
+    assert ThresholdFeatures(MAP(100), 3, 10**12, seed=0).threshold.max() < 10**12

@@ -6,22 +6,23 @@ from collections.abc import Callable
 
 import pytest
 import torch
+from readings import centres, seeded
 from torch import Tensor, nn
 from torch.testing import assert_close
 
 import torchvsa
-from torchvsa import PROTECTIONS, VSA, CleanUp, Record, SelfShift
-from torchvsa.encoding import COMBINATIONS, VALUES
+from torchvsa import PROTECTIONS, VSA, CleanUp, SelfShift
+from torchvsa.encoders import Encoder, Lookup, Sum, ThresholdFeatures
 
-INDICES = torch.tensor([[0, 3], [-1, 2], [1, 1]])
-
-
-def seeded(seed: int) -> torch.Generator:
-    return torch.Generator().manual_seed(seed)
+READINGS = centres(torch.tensor([[0, 3], [-1, 2], [1, 1]]), 4)
 
 
 def record(vsa: VSA, seed: int) -> nn.Module:
-    return Record(vsa, 2, 4, generator=seeded(seed))
+    return Sum(Lookup(vsa, 4), 2, seed)
+
+
+def threshold_features(vsa: VSA, seed: int) -> nn.Module:
+    return ThresholdFeatures(vsa, 2, 9, seed=seed)
 
 
 def self_shift(vsa: VSA, seed: int) -> nn.Module:
@@ -35,8 +36,8 @@ def clean_up(vsa: VSA, seed: int) -> nn.Module:
 
 
 def answers(module: nn.Module, vsa: VSA) -> list[Tensor]:
-    if isinstance(module, Record):
-        return [module(INDICES)]
+    if isinstance(module, Encoder):
+        return [module(READINGS)]
     answer = module(vsa.random(6, generator=seeded(9)))
     return [answer] if isinstance(answer, Tensor) else list(answer)
 
@@ -45,7 +46,7 @@ def equal(these: list[Tensor], those: list[Tensor]) -> bool:
     return all(torch.equal(a, b) for a, b in zip(these, those, strict=True))
 
 
-@pytest.fixture(params=[record, self_shift, clean_up])
+@pytest.fixture(params=[record, threshold_features, self_shift, clean_up])
 def make(request: pytest.FixtureRequest) -> Callable[[VSA, int], nn.Module]:
     return request.param
 
@@ -129,7 +130,7 @@ def test_gradients_are_those_of_finite_differences(name: str) -> None:
 @pytest.mark.parametrize("name", ["MAP-C", "MAP-I", "HRR"])
 def test_gradients_flow_through_a_whole_program_in_float32(name: str) -> None:
     vsa = torchvsa.architecture(name, 200)
-    encode = Record(vsa, 2, 4, generator=seeded(0))
+    encode = Sum(Lookup(vsa, 4), 2, 0)
     encode.codes.requires_grad_()
     conditions = vsa.bundle(vsa.bind(encode.roles, encode.codes[torch.tensor([[0, 3], [1, 1]])]))
     program = torch.zeros(200, requires_grad=True)
@@ -165,16 +166,6 @@ def test_vmap_equals_the_loop(vsa: VSA) -> None:
     assert_close(shared, vsa.bind(a, b[0]))
 
 
-@pytest.mark.parametrize("values", VALUES)
-@pytest.mark.parametrize("combine", COMBINATIONS)
-def test_every_record_survives_its_state_dict(values: str, combine: str) -> None:
-    vsa = torchvsa.MAP(300, dtype=torch.int8)
-    first, second = (Record(vsa, 2, 4, values, combine, seeded(seed)) for seed in (0, 1))
-    assert not torch.equal(first(INDICES), second(INDICES))
-    second.load_state_dict(first.state_dict())
-    assert torch.equal(first(INDICES), second(INDICES))
-
-
 def test_an_accelerator_gives_the_same_answers(make: Make) -> None:
     if not torch.cuda.is_available():
         pytest.skip("there is no CUDA device")
@@ -182,6 +173,6 @@ def test_an_accelerator_gives_the_same_answers(make: Make) -> None:
     module = make(vsa, 0)
     before = answers(module, vsa)
     module.cuda()
-    given = INDICES if isinstance(module, Record) else vsa.random(6, generator=seeded(9))
+    given = READINGS if isinstance(module, Encoder) else vsa.random(6, generator=seeded(9))
     after = module(given.cuda())
     assert equal([x.cpu() for x in ([after] if isinstance(after, Tensor) else after)], before)

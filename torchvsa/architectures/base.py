@@ -41,7 +41,7 @@ class VSA(ABC):
     """Whether `bind(a, b)` equals `bind(b, a)`."""
     bilinear: ClassVar[bool] = True
     """Whether `bind` is linear in each argument, so that it distributes over raw accumulators."""
-    self_inverse: ClassVar[bool] = False
+    self_inverse: bool = False
     """Whether `bind` with the same key undoes itself."""
     negatable: ClassVar[bool] = True
     """Whether hypervectors have a `negative`."""

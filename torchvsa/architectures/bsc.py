@@ -24,6 +24,7 @@ class BSC(VSA):
     """
 
     name = "BSC"
+    self_inverse = True
     breaks_ties = True
 
     def __init__(self, dim: int, dtype: torch.dtype = torch.bool) -> None:

@@ -73,6 +73,9 @@ class HRR(VSA):
 
     def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
         """See `VSA.from_angles`: the inverse Fourier transform, of length 1."""
+        if 0 in angles.shape[:-1]:
+            # The Fourier transform refuses an empty batch.
+            return angles.new_zeros(*angles.shape[:-1], self.dim, dtype=self.dtype)
         ends = torch.zeros_like(angles[..., :1]) if angles.shape[-1] else angles.new_zeros(*angles.shape[:-1], 1)
         whole = torch.cat([ends, angles] + ([ends] if self.dim % 2 == 0 else []), -1)
         return torch.fft.irfft(torch.polar(torch.ones_like(whole), whole), n=self.dim).to(self.dtype)

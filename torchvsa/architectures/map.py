@@ -53,6 +53,7 @@ class MAP(VSA):
         self.atoms = atoms
         self.name = f"MAP-{variant}"
         self.breaks_ties = variant == "B"
+        self.self_inverse = atoms == "bipolar"
 
     def config(self) -> dict[str, str | int]:
         """See `VSA.config`; names the atoms too where they are not the default."""

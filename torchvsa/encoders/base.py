@@ -8,14 +8,14 @@ import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor
 
-from torchvsa._checks import whole_number
+from torchvsa._checks import readable, whole_number
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.errors import ShapeError
 from torchvsa.part import Layout, Part
 
 P = TypeVar("P", bound=Part)
-_ROUNDING = 1 + 2.0**-50
+_ROUNDING = 2.0**-50
 """Covers the three roundings in float64 between a reading and its position among the bins."""
 
 UNOBSERVED = -1
@@ -99,7 +99,7 @@ class ValueEncoder(Part):
     def forward(self, x: Float[Tensor, "*batch"]) -> Shaped[Tensor, "*batch d"]:
         """Encode each reading. Raises `ValueError` for readings that are NaN or outside of [0, 1]."""
         check_range(x)
-        if not torch.compiler.is_compiling() and x.isnan().any():
+        if readable(x) and x.isnan().any():
             raise ValueError("a value that was not observed has no hypervector; records leave it out")
         self._require_drawn()
         return self.encode(self.cells(x))
@@ -150,9 +150,10 @@ class Binned(ValueEncoder):
 def binned(x: Float[Tensor, "*batch"], bins: int) -> Int64[Tensor, "*batch"]:
     """The bin of each value among `bins` of equal width over [0, 1], -1 for NaN.
 
-    A value that is an edge but for rounding (7 of a range of 25, in 25 bins) is in the bin above the edge.
+    A value that is an edge but for rounding in its type (7 of a range of 25, in 25 bins) is in the bin above the edge.
     """
-    index = (x * (bins * _ROUNDING)).floor().clamp(0, bins - 1)
+    rounding = max(_ROUNDING, torch.finfo(x.dtype).eps)
+    index = (x.to(torch.float64) * (bins * (1 + rounding))).floor().clamp(0, bins - 1)
     return torch.where(x.isnan(), float(UNOBSERVED), index).to(torch.int64)
 
 
@@ -162,8 +163,8 @@ def continuous(x: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
 
 
 def check_range(x: Float[Tensor, "*batch"]) -> None:
-    """Raise `ValueError` for a value outside of [0, 1]; NaN is none. In a graph nothing is looked at."""
-    if torch.compiler.is_compiling() or x.device.type != "cpu" or not ((x < 0) | (x > 1)).any():
+    """Raise `ValueError` for a value outside of [0, 1]; NaN is none. Where values cannot be looked at, nothing is."""
+    if not readable(x) or not ((x < 0) | (x > 1)).any():
         return
     place = ((x < 0) | (x > 1)).nonzero()[0].tolist()
     raise ValueError(

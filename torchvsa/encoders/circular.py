@@ -21,7 +21,7 @@ class Circular(Binned):
 
     def cells(self, x: Float[Tensor, "*batch"]) -> Int64[Tensor, "*batch"]:
         """The bin of each reading; 1 is in the first one, as 0 is."""
-        return torch.where(x == 1, 0, super().cells(x))
+        return torch.where(x >= 1, 0, super().cells(x))
 
     def _codes(self, generator: torch.Generator | None) -> Shaped[Tensor, "bins d"]:
         start = self.vsa.random(generator=generator)

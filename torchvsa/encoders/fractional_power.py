@@ -7,6 +7,7 @@ import torch
 from jaxtyping import Float, Shaped
 from torch import Tensor
 
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.encoders.base import ValueEncoder, continuous
 from torchvsa.part import Layout
@@ -71,6 +72,7 @@ class FractionalPower(ValueEncoder):
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
         ((_, shape),) = self.own_layout().values()
+        require_memory(24 * shape[0], f"drawing {shape[0]:,} angles", "take fewer dimensions")
         if self.kernel == "sinc":
             return {"theta": (2 * torch.rand(shape, generator=generator, dtype=torch.float64) - 1) * math.pi}
         return {"theta": torch.randn(shape, generator=generator, dtype=torch.float64)}

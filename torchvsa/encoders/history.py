@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import torch
 from jaxtyping import Float, Int64, Shaped
@@ -13,6 +13,8 @@ from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Encoder, planned
 from torchvsa.encoders.registry import encoder
 from torchvsa.part import Layout
+
+H = TypeVar("H", bound="History")
 
 
 class History(Encoder):
@@ -58,7 +60,7 @@ class History(Encoder):
         return {"name": self.name, "present": self.present.config(), "lags": list(self.lags), "hold": self.hold}
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any], vsa: VSA) -> Self:
+    def from_config(cls: type[H], config: Mapping[str, Any], vsa: VSA) -> H:
         """See `Part.from_config`."""
         return cls(encoder(config["present"], vsa), config["lags"], config["hold"])
 

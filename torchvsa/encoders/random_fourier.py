@@ -7,6 +7,7 @@ import torch
 from jaxtyping import Float, Shaped
 from torch import Tensor
 
+from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.encoders.base import Encoder, continuous, whole
 from torchvsa.part import Layout
@@ -71,6 +72,11 @@ class RandomFourier(Encoder):
         return (2**0.5 * waves).to(self.vsa.dtype)
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
+        require_memory(
+            16 * (self.sensors + 1) * self.vsa.dim,
+            f"drawing random features of {self.sensors:,} sensors at d = {self.vsa.dim:,}",
+            "take fewer sensors or dimensions",
+        )
         omega = torch.randn(self.sensors, self.vsa.dim, generator=generator, dtype=torch.float64)
         phase = torch.rand(self.vsa.dim, generator=generator, dtype=torch.float64) * (2 * math.pi)
         return {"omega": omega, "phase": phase}

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, Self
+from typing import Any, TypeVar
 
 import torch
 from jaxtyping import Bool, Float, Int64, Shaped
@@ -14,6 +14,8 @@ from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Binned, Encoder, ValueEncoder, planned, whole
 from torchvsa.encoders.registry import value_encoder
 from torchvsa.part import Layout, Part
+
+R = TypeVar("R", bound="Record")
 
 
 class Record(Encoder):
@@ -53,7 +55,7 @@ class Record(Encoder):
         # One value encoder given for several sensors stays one.
         copies = {id(value): planned(value) for value in given}
         self.values = nn.ModuleList([copies[id(value)] for value in given])
-        self.discrete = all(value.discrete for value in self._values)
+        self.discrete = all(value.discrete for value in copies.values())
         self.register_buffer("table", None, persistent=False)
         self._own(seed)
 
@@ -99,7 +101,7 @@ class Record(Encoder):
         return {"name": self.name, "values": values[0] if self.shared else values, "sensors": self.sensors}
 
     @classmethod
-    def from_config(cls, config: Mapping[str, Any], vsa: VSA) -> Self:
+    def from_config(cls: type[R], config: Mapping[str, Any], vsa: VSA) -> R:
         """See `Part.from_config`."""
         options = {key: value for key, value in config.items() if key not in ("name", "values")}
         given = config["values"]
@@ -159,7 +161,7 @@ class Record(Encoder):
     # -- codebooks ----------------------------------------------------------------------------------------
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
-        bins = max(getattr(value, "bins", 0) for value in self._values)
+        bins = max(getattr(value, "bins", 0) for value in self.values)
         require_memory(
             2 * self.sensors * (bins + 1) * self.vsa.row_bytes,
             f"a record of {self.sensors:,} sensors with {bins:,} bins at d = {self.vsa.dim:,}",

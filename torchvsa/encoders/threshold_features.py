@@ -51,7 +51,7 @@ class ThresholdFeatures(Encoder):
         sensors: int,
         bins: int = 32,
         subset: int | None = None,
-        edges: int | Sequence[Float64[Tensor, "edges"]] | None = None,
+        edges: int | Sequence[Float[Tensor, "_"]] | None = None,
         seed: int | None = None,
     ) -> None:
         super().__init__()
@@ -98,6 +98,7 @@ class ThresholdFeatures(Encoder):
         """The bin of each reading."""
         if self._edge_count is None:
             return binned(x, self.bins)
+        x = x.clamp(0, 1)
         if torch.compiler.is_exporting():
             # The same by comparisons: interchange formats have no bucket search.
             found = (x[..., None] >= self.edges).sum(-1)
@@ -161,8 +162,8 @@ def _edges(edges: Sequence[Tensor], sensors: int, bins: int) -> Float64[Tensor, 
         raise ValueError(f"edges must be given for each of {sensors} sensors; got {len(edges)} of them")
     rows = [torch.as_tensor(row, dtype=torch.float64).flatten() for row in edges]
     for sensor, row in enumerate(rows):
-        if row.isnan().any() or (row[1:] < row[:-1]).any() or (row < 0).any():
-            raise ValueError(f"the edges of sensor {sensor} must be sorted and at least 0")
+        if row.isnan().any() or (row[1:] < row[:-1]).any() or (row < 0).any() or (row[row.isfinite()] > 1).any():
+            raise ValueError(f"the edges of sensor {sensor} must be sorted and from 0 to 1")
         if len(row) >= bins and row[bins - 1 :].isfinite().any():
             raise ValueError(
                 f"sensor {sensor} has {len(row)} edges, which part one bin more than that; the encoder has {bins}"

@@ -1,0 +1,135 @@
+"""Every listed encoder keeps the laws in every architecture: one that joins the registry needs an example here."""
+
+from collections.abc import Callable, Iterator
+from typing import Any, cast
+
+import pytest
+import torch
+from readings import rows
+
+import torchvsa
+from torchvsa import VSA
+from torchvsa.encoders import (
+    ENCODERS,
+    VALUE_ENCODERS,
+    Balanced,
+    Circular,
+    Encoder,
+    FractionalPower,
+    History,
+    Level,
+    Lookup,
+    Product,
+    RandomFourier,
+    SubsetProduct,
+    Sum,
+    Thermometer,
+    ThresholdFeatures,
+    ValueEncoder,
+)
+from torchvsa.testing import check_encoder, check_value_encoder
+
+VALUES: dict[str, Callable[[VSA], ValueEncoder]] = {
+    "lookup": lambda vsa: Lookup(vsa, 6),
+    "level": lambda vsa: Level(vsa, 9, span=3),
+    "balanced": lambda vsa: Balanced(vsa, 5),
+    "thermometer": lambda vsa: Thermometer(vsa, 7),
+    "circular": lambda vsa: Circular(vsa, 8),
+    "fractional_power": lambda vsa: FractionalPower(vsa, 0.3, "sinc"),
+}
+ROWS: dict[str, Callable[[VSA], Encoder]] = {
+    "sum": lambda vsa: Sum(Level(vsa, 8), 3),
+    "product": lambda vsa: Product(Lookup(vsa, 5), 2),
+    "subset_product": lambda vsa: SubsetProduct(Level(vsa, 8), 3, 2),
+    "threshold_features": lambda vsa: ThresholdFeatures(vsa, 3, 9, 2),
+    "random_fourier": lambda vsa: RandomFourier(vsa, 3),
+    "history": lambda vsa: History(Sum(Level(vsa, 8), 2), [1, 3]),
+}
+EDGES = [torch.tensor([0.25, 0.5]), torch.tensor([0.125, 0.125, 0.75])]
+MORE: dict[str, Callable[[VSA], Encoder]] = {
+    "sum of mixed bins": lambda vsa: Sum([Level(vsa, 8), Circular(vsa, 6), Lookup(vsa, 3)]),
+    "subset product of mixed bins": lambda vsa: SubsetProduct([Level(vsa, 8), Circular(vsa, 6), Lookup(vsa, 3)]),
+    "product of powers": lambda vsa: Product(FractionalPower(vsa), 2),
+    "sum of powers and bins": lambda vsa: Sum([FractionalPower(vsa), Level(vsa, 8)]),
+    "waves": lambda vsa: RandomFourier(vsa, 2, sign=False),
+    "edges": lambda vsa: ThresholdFeatures(vsa, 2, 9, edges=EDGES),
+    "held history": lambda vsa: History(Product(Level(vsa, 8), 2), [1, 2], hold=True),
+    "held present": lambda vsa: History(Sum(Lookup(vsa, 4), 2), [], hold=True),
+    "history of powers": lambda vsa: History(Sum(FractionalPower(vsa), 2), [2]),
+    "history of edges": lambda vsa: History(ThresholdFeatures(vsa, 2, 9, edges=EDGES), [1]),
+}
+NEEDS: dict[str, Callable[[VSA], bool]] = {
+    **dict.fromkeys(("subset_product", "subset product of mixed bins"), lambda vsa: vsa.elementwise),
+    **dict.fromkeys(
+        ("fractional_power", "product of powers", "sum of powers and bins", "history of powers"),
+        lambda vsa: vsa.frequencies is not None,
+    ),
+    "random_fourier": lambda vsa: vsa.elementwise and not vsa.dtype.is_complex and vsa.dtype != torch.bool,
+    "waves": lambda vsa: vsa.elementwise and vsa.dtype.is_floating_point,
+}
+
+
+def plan(name: str, vsa: VSA) -> Any:
+    make = (VALUES | ROWS | MORE)[name]
+    if not NEEDS.get(name, lambda _: True)(vsa):
+        with pytest.raises(ValueError, match=vsa.name):
+            make(vsa)
+        pytest.skip(f"{vsa.name} is refused, as it should be")
+    return make(vsa)
+
+
+def test_every_listed_encoder_has_an_example() -> None:
+    assert set(VALUES) == set(VALUE_ENCODERS)
+    assert set(ROWS) == set(ENCODERS)
+    for name, kind in (*VALUE_ENCODERS.items(), *ENCODERS.items()):
+        assert kind.name == name
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_value_encoders_keep_the_laws(vsa: VSA, name: str) -> None:
+    encode = plan(name, vsa)
+    check_value_encoder(encode)
+    assert not encode.drawn
+    check_value_encoder(encode.draw(torch.Generator().manual_seed(1)))
+
+
+@pytest.mark.parametrize("name", [*ROWS, *MORE])
+def test_encoders_keep_the_laws(vsa: VSA, name: str) -> None:
+    encode = plan(name, vsa)
+    check_encoder(encode)
+    assert not encode.drawn
+    check_encoder(encode.draw(torch.Generator().manual_seed(1)))
+
+
+@pytest.mark.parametrize("dim", [63, 301])
+@pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
+def test_laws_hold_in_odd_dimensions(name: str, dim: int) -> None:
+    vsa = torchvsa.architecture(name, dim)
+    for kind, make in (ROWS | MORE).items():
+        if NEEDS.get(kind, lambda _: True)(vsa):
+            check_encoder(make(vsa))
+
+
+@pytest.mark.parametrize("dtype", [torch.float64, torch.float16])
+@pytest.mark.parametrize("name", ["sum", "product", "subset_product", "threshold_features", "history"])
+def test_another_float_type_keeps_bipolar_codes(name: str, dtype: torch.dtype) -> None:
+    encode = ROWS[name](torchvsa.MAP(300)).draw(torch.Generator().manual_seed(0))
+    x = rows(20, encode.width)
+    before = encode(x)
+    assert torch.equal(encode.to(dtype)(x).float(), before)
+
+
+@pytest.fixture
+def compiler() -> Iterator[None]:
+    yield
+    torch.compiler.reset()
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("compiler")
+@pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
+def test_inductor_gives_the_same_bits() -> None:
+    encode = MORE["held history"](torchvsa.MAP(512, dtype=torch.int8)).draw(torch.Generator().manual_seed(0))
+    x = rows(10, encode.width)
+    compiled = cast(Callable[..., torch.Tensor], torch.compile(encode, fullgraph=True))
+    assert torch.equal(compiled(x), encode(x))

@@ -1,0 +1,58 @@
+"""Registries: parts by name, and errors that list the names there are."""
+
+import pytest
+
+import torchvsa
+from torchvsa import ARCHITECTURES, PROTECTIONS, protection
+from torchvsa.encoders import ENCODERS, VALUE_ENCODERS, Level, encoder, value_encoder
+from torchvsa.registry import Registry
+
+ALL = [ARCHITECTURES, PROTECTIONS, ENCODERS, VALUE_ENCODERS]
+VSA = torchvsa.MAP(16)
+
+
+@pytest.mark.parametrize("registry", ALL, ids=lambda registry: registry.kind)
+@pytest.mark.parametrize("name", ["nothing", "", None, 3, ["level"]])
+def test_an_unknown_name_lists_the_choices(registry: Registry[object], name: object) -> None:
+    with pytest.raises(ValueError, match=f"there is no {registry.kind} ") as refused:
+        registry.find(name)
+    assert repr(name) in str(refused.value)
+    assert all(choice in str(refused.value) for choice in registry)
+
+
+def test_configs_with_unknown_names_list_the_choices() -> None:
+    for make, choice in ((encoder, "subset_product"), (value_encoder, "level"), (protection, "self_shift")):
+        for config in ({"name": "x"}, {}):
+            with pytest.raises(ValueError, match=choice):
+                make(config, VSA)
+
+
+def test_a_name_is_given_once() -> None:
+    registry: Registry[object] = Registry("part", {"one": 1})
+    registry.register("two", Level)
+    with pytest.raises(ValueError, match="there is another part 'one' already: 1"):
+        registry.register("one", 2)
+    registry.register("two", Level)  # the same part again, as when a module is imported twice
+    assert dict(registry) == {"one": 1, "two": Level}
+    assert len(registry) == 2
+    assert "two" in registry
+    assert registry["one"] == registry.find("one") == 1
+    assert repr(registry) == "Registry('part', ['one', 'two'])"
+    with pytest.raises(KeyError):
+        registry["three"]
+
+
+@pytest.mark.parametrize("name", ["", None, 3])
+def test_a_name_is_a_text(name: str) -> None:
+    with pytest.raises(ValueError, match="the name of a part is a text that is not empty"):
+        Registry("part").register(name, 1)
+
+
+def test_what_joins_is_found_by_name() -> None:
+    class Mine(Level):
+        name = "mine"
+
+    registry = Registry("value encoder", dict(VALUE_ENCODERS))
+    registry.register(Mine.name, Mine)
+    assert registry.find("mine") is Mine
+    assert "mine" not in VALUE_ENCODERS

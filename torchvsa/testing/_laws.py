@@ -1,0 +1,47 @@
+"""How laws are run and reported."""
+
+from collections.abc import Callable, Iterable
+from typing import TypeVar
+
+import torch
+from jaxtyping import TypeCheckError
+from torch import Tensor
+from torch.testing import assert_close
+
+T = TypeVar("T")
+
+
+def check(part: T, laws: Iterable[Callable[[T], None]]) -> None:
+    """Run each law on the part. Raises `AssertionError` naming the first one that does not hold."""
+    for law in laws:
+        try:
+            law(part)
+        except Exception as error:
+            name = law.__name__.strip("_").replace("_", " ")
+            what = " ".join(repr(part).split())
+            raise AssertionError(f"{what} breaks the law: {name}. {type(error).__name__}: {error}") from error
+
+
+def require(holds: Tensor | bool, message: str = "it does not hold") -> None:
+    """Raise `AssertionError` with the message unless it holds, also where Python runs without assertions."""
+    if not bool(holds):
+        raise AssertionError(message)
+
+
+def same(a: Tensor, b: Tensor) -> None:
+    """Raise `AssertionError` unless both hold the same numbers, in the same type and shape."""
+    assert_close(a, b, rtol=0, atol=0, equal_nan=True)
+
+
+def refuses(error: type[Exception], call: Callable[[], object]) -> None:
+    """Raise `AssertionError` unless the call raises this error, or a checker of annotations raises its own before."""
+    try:
+        call()
+    except (error, TypeCheckError):
+        return
+    raise AssertionError(f"no {error.__name__} was raised")
+
+
+def seeded(seed: int) -> torch.Generator:
+    """A generator of its own."""
+    return torch.Generator().manual_seed(seed)
