@@ -14,7 +14,7 @@ from torch import Tensor
 
 from torchvsa._checks import readable, type_bound
 from torchvsa.blocks import by_blocks
-from torchvsa.operators import integer_product, product
+from torchvsa.operators import integer_product
 
 
 def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
@@ -51,7 +51,7 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     if a.is_complex() or b.is_complex():
         # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
         wide = torch.promote_types(a.dtype, b.dtype)
-        return product(real_parts(a.to(wide)), real_parts(b.to(wide)))
+        return real_parts(a.to(wide)) @ real_parts(b.to(wide)).T
     int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
     if int8 and (a.device.type == "cuda" or (a.device.type == "cpu" and a.shape[-1] > 1)):
         # Units for int8; those of a CPU answer nonsense where d = 1.
@@ -61,7 +61,7 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
         wide = torch.float64
     elif any(is_integer(x) and x.dtype.itemsize > 2 for x in (a, b)):
         wide = torch.float64  # float32 does not hold every int32
-    return product(a.to(wide), b.to(wide))
+    return a.to(wide) @ b.to(wide).T
 
 
 def _int8_dots(a: Shaped[Tensor, "rows d"], b: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "rows k"]:

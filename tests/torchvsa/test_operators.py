@@ -12,7 +12,7 @@ from torch.func import jacrev, jvp, vmap
 from torch.testing import assert_close
 
 from torchvsa.exact import dots
-from torchvsa.operators import common, look_up, looked_up, product, rotated, rotation
+from torchvsa.operators import common, look_up, looked_up, rotated, rotation
 
 TYPES = [torch.int8, torch.bool, torch.int32, torch.float32, torch.float64, torch.complex64]
 
@@ -159,36 +159,25 @@ def test_looking_up_is_mapped_and_differentiated(how: Any, cache: int, monkeypat
     assert_close(leaf.grad, asked)
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
-@pytest.mark.parametrize("shape", [(3, 9), (16, 9), (4, 5, 9), (40, 9), (16, 1), (9,), (0, 9)])
-@pytest.mark.parametrize("items", [1, 2, 17])
-def test_products_are_those_of_pytorch(shape: tuple[int, ...], items: int, dtype: torch.dtype) -> None:
-    a, b = drawn(*shape, dtype=dtype), drawn(items, shape[-1], dtype=dtype, seed=1)
-    assert torch.equal(product(a, b), a @ b.T)  # whole numbers, which no order of additions rounds
-    assert torch.equal(whole(product)(a, b), a @ b.T)
-    assert product(a, b).dtype == dtype
-    torch.compiler.reset()
-
-
 def test_products_of_floats_are_as_near_as_those_of_pytorch() -> None:
     a, b = (torch.randn(64, 1000, generator=torch.Generator().manual_seed(seed)) for seed in (0, 1))
-    assert_close(product(a, b).double(), a.double() @ b.double().T, atol=1e-4, rtol=0)
+    assert_close(dots(a, b).double(), a.double() @ b.double().T, atol=1e-4, rtol=0)
     strided = torch.randn(1000, 64, generator=torch.Generator().manual_seed(2)).T
-    assert_close(product(strided, b[::2]).double(), strided.double() @ b[::2].double().T, atol=1e-4, rtol=0)
+    assert_close(dots(strided, b[::2]).double(), strided.double() @ b[::2].double().T, atol=1e-4, rtol=0)
 
 
 @pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
 def test_products_are_mapped_and_differentiated() -> None:
     a, b = drawn(3, 20, 5, dtype=torch.float32), drawn(3, 4, 5, dtype=torch.float32, seed=1)
-    assert torch.equal(vmap(product)(a, b), a @ b.mT)
-    assert torch.equal(vmap(product, (0, None))(a, b[0]), a @ b[0].T)
-    assert torch.equal(vmap(product, (None, 0))(a[0], b), a[0] @ b.mT)
-    value, slope = cast(Any, jvp(product, (a[0], b[0]), (a[1], b[1])))
+    assert torch.equal(vmap(dots)(a, b), a @ b.mT)
+    assert torch.equal(vmap(dots, (0, None))(a, b[0]), a @ b[0].T)
+    assert torch.equal(vmap(dots, (None, 0))(a[0], b), a[0] @ b.mT)
+    value, slope = cast(Any, jvp(dots, (a[0], b[0]), (a[1], b[1])))
     assert torch.equal(value, a[0] @ b[0].T)
     assert torch.equal(slope, a[1] @ b[0].T + a[0] @ b[1].T)
-    assert torch.equal(jacrev(lambda x: product(a[0], x).sum())(b[0]), a[0].sum(0).expand(4, 5))
+    assert torch.equal(jacrev(lambda x: dots(a[0], x).sum())(b[0]), a[0].sum(0).expand(4, 5))
     leaf = a[0].clone().requires_grad_()
-    product(leaf, b[0]).sum().backward()
+    dots(leaf, b[0]).sum().backward()
     assert leaf.grad is not None
     assert torch.equal(leaf.grad, b[0].sum(0).expand(20, 5))
 

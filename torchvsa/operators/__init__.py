@@ -5,7 +5,7 @@ Where a gradient is wanted, in exported graphs and mostly on a GPU, PyTorch's ow
 """
 
 from torchvsa.operators.look_up import entries, looked_up
-from torchvsa.operators.matrix import integer_product, product
+from torchvsa.operators.matrix import integer_product
 from torchvsa.operators.rotation import rotated
 
-__all__ = ["entries", "integer_product", "looked_up", "product", "rotated"]
+__all__ = ["entries", "integer_product", "looked_up", "rotated"]

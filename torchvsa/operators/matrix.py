@@ -1,27 +1,9 @@
-"""Products of matrices, of float32 and of int8."""
-
-from typing import Any
+"""Products of int8 matrices."""
 
 import torch
-from jaxtyping import Int8, Int32, Shaped
+from jaxtyping import Int8, Int32
 from torch import Tensor
 from torch.nn import functional
-
-from torchvsa.operators.common import differentiated, stacked
-
-_MANY = 16
-"""Rows from which on the operator's own cost is small beside that of the product."""
-_ONEDNN = torch.backends.mkldnn.is_available() and hasattr(torch.ops.mkldnn, "_linear_pointwise")
-
-
-def product(a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
-    """`a @ b.T`; many rows of float32 by oneDNN, whose product was 5 to 15 % faster than that of `@` on an AMD CPU."""
-    rows = a.reshape(-1, a.shape[-1])
-    plain = a.dtype != torch.float32 or a.device.type != "cpu" or torch.compiler.is_exporting() or not _ONEDNN
-    if plain or rows.shape[0] < _MANY or differentiated(a) or differentiated(b):
-        return a @ b.T
-    return torch.ops.torchvsa.product(rows, b).reshape(*a.shape[:-1], len(b))
-
 
 _FEWEST, _FEW = 3, 16
 """A CPU multiplies many rows of int8 fastest with one item at a time if they are so few, and else, if they are fewer
@@ -50,19 +32,3 @@ def by_whole_tiles(a: Int8[Tensor, "rows d"], b: Int8[Tensor, "k d"]) -> Int32[T
 def _filled_up(x: Int8[Tensor, "rows d"]) -> Int8[Tensor, "more_rows more_d"]:
     rows, columns = (_WHOLE * max(-(-size // _WHOLE), 1) - size for size in x.shape)
     return functional.pad(x, (0, columns, 0, rows)) if rows or columns else x.contiguous()
-
-
-@torch.library.custom_op("torchvsa::product", mutates_args=())
-def _product(a: Tensor, b: Tensor) -> Tensor:
-    return torch.ops.mkldnn._linear_pointwise(a, b, None, "none", [], "")
-
-
-@_product.register_fake
-def _(a: Tensor, b: Tensor) -> Tensor:
-    return a.new_empty(a.shape[0], b.shape[0])
-
-
-@_product.register_vmap
-def _(info: Any, in_dims: tuple[int | None, ...], a: Tensor, b: Tensor) -> tuple[Tensor, int]:
-    a, b = stacked(info, in_dims, a, b)
-    return a @ b.mT, 0
