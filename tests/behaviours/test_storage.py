@@ -363,3 +363,15 @@ def test_copies_of_a_behaviour_can_join_its_bank_again(duplicate: Callable[[Any]
     changed.space.encoder.codes[0].neg_()
     with pytest.raises(ValueError, match="learned over another space"):
         made.add("avoid", changed["avoid"])
+
+
+FILES = Path(__file__).parent / "files"
+
+
+def test_files_of_format_2_are_read_by_all_later_versions() -> None:
+    """Written once, by 0.2.0; they are never written again."""
+    shown = Demonstrations.load(FILES / "demonstrations_format_2.safetensors")
+    assert (shown.sensor_names, shown.actuator_names) == (("left", "right"), ("turn",))
+    steer = BehaviourBank.load(FILES / "bank_format_2.safetensors")["steer towards. é"]
+    recall, _ = steer.step(shown.sensors, steer.start(range(4)))
+    assert torch.equal(recall.commands, shown.commands)
