@@ -8,7 +8,7 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.state import check_alike, check_rows, join, rows_of
+from sim.state import check_alike, check_rows, is_empty, join, rows_of
 
 
 @runtime_checkable
@@ -114,17 +114,18 @@ def replay(policy: Policy, readings: NDArray[np.float64], episodes: NDArray[np.i
     """What a policy answers to recorded readings `[N, n]`, `[N, ...]`, as if it had been there from the start.
 
     `episodes` `[N]` says which episode each row is of; the rows of an episode are its steps from 0 on, in this order.
-    A plain function is asked about all rows at once.
+    What has no state is asked about all rows at once.
     """
     controller = as_controller(policy)
-    if isinstance(controller, _Stateless):
-        return np.asarray(_plain(controller.function(readings.copy())))
     order = np.argsort(episodes, kind="stable")
     numbers, first, lengths = np.unique(episodes[order], return_index=True, return_counts=True)
     # The longest episodes first, so that those that still run are always the first rows.
     longest = np.argsort(-lengths, kind="stable")
     numbers, first, lengths = numbers[longest], first[longest], lengths[longest]
     state, going = begin(controller, numbers), len(numbers)
+    if is_empty(state):
+        state = begin(controller, episodes)
+        return np.asarray(advance(controller, readings, state, f"episode {episodes[0]}, step 0")[0])
     places, answers = [], []
     for step in range(int(lengths[0])):
         left = int(np.count_nonzero(lengths > step))

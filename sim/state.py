@@ -5,6 +5,7 @@ Tensors are handled by their own methods, so that nothing here imports PyTorch.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -22,6 +23,13 @@ def check_alike(state: Any, earlier: Any) -> None:
     ours, theirs = (_map(lambda leaf: (leaf.dtype, tuple(leaf.shape[1:])), one) for one in (state, earlier))
     if ours != theirs:
         raise ValueError(f"the state holds {ours}, earlier it held {theirs}; its structure, types and shapes must stay")
+
+
+def is_empty(state: Any) -> bool:
+    """Whether the state holds no number: the robots remember nothing."""
+    sizes: list[int] = []
+    _map(lambda leaf: sizes.append(math.prod(leaf.shape)), state)
+    return not any(sizes)
 
 
 def rows_of(state: Any, index: slice | NDArray[np.int64]) -> Any:

@@ -234,3 +234,22 @@ def test_a_replay_gives_the_commands_of_the_rollout(policy: sim.Policy) -> None:
     # The rows of different episodes may stand in any order.
     order = np.argsort(path.step, kind="stable")
     np.testing.assert_array_equal(sim.replay(policy, path.sensors[order], episodes[order]), path.commands[order])
+
+
+@pytest.mark.parametrize("empty", [lambda size: None, lambda size: {"past": [torch.empty(size, 0, 3)]}])
+def test_a_replay_asks_a_controller_without_memory_once(empty: Callable[[int], Any]) -> None:
+    asked: list[int] = []
+
+    class Now:
+        def start(self, episodes: Integers) -> Any:
+            return empty(len(episodes))
+
+        def step(self, readings: Floats, state: Any) -> tuple[Floats, Any]:
+            asked.append(len(readings))
+            return sim.Teacher()(readings), state
+
+    run = sim.rollout(Now(), episodes=range(3), seconds=1.0, robots=2)
+    asked.clear()
+    commands = sim.replay(Now(), run.trajectory.sensors, run.step_episode)
+    np.testing.assert_array_equal(commands, run.trajectory.commands)
+    assert asked == [60]
