@@ -11,7 +11,7 @@ run: $(INSTALLED)
 	$(BIN)/python -m experiments.corral
 
 test: $(INSTALLED) lint
-	$(BIN)/python -m pytest -n 2 --dist worksteal
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks
