@@ -5,7 +5,6 @@ them when they are asked for.
 """
 
 import sys
-from collections.abc import Callable
 from typing import Any, Self
 
 import numpy as np
@@ -92,7 +91,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
                 )
             space = self._class_space(readings)
             shown = Demonstrations(torch.tensor(readings), torch.tensor(labels[:, None]))
-            self.behaviour_ = self._trained(lambda: self._rule(space.seed).fit(space, shown, self._progress()))
+            self.behaviour_ = self._rule(space.seed).fit(space, shown, self._progress())
         return self
 
     @no_convergence_warnings()
@@ -126,7 +125,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
             # Another seed for each call, or all would visit their rows in the same order.
             rule = self._rule(before.space.seed + before.report.updates)
             shown = Demonstrations(torch.tensor(readings), labels)
-            self.behaviour_ = self._trained(lambda: rule.partial_fit(before, shown, self._progress()))
+            self.behaviour_ = rule.partial_fit(before, shown, self._progress())
         return self
 
     def _check_parameters(self) -> None:
@@ -144,15 +143,6 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     def _rule(self, seed: int) -> Gradient:
         passes, batch, rate = self._whole("passes"), self._whole("batch"), self._positive("learning_rate")
         return Gradient(passes=passes, batch=batch, learning_rate=rate, sparse=True, seed=seed)
-
-    def _trained(self, train: Callable[[], Behaviour]) -> Behaviour:
-        """What `train` answers; where its program left the numbers, an error that names the reason."""
-        try:
-            return train()
-        except ValueError as error:
-            if "not finite" not in str(error):
-                raise
-            raise ValueError(f"training diverged with learning_rate={self.learning_rate}; take a lower one") from error
 
     def _blank(self, space: Space) -> Behaviour:
         """The behaviour that knows all classes and no condition."""

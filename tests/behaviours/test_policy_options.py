@@ -6,13 +6,13 @@ from typing import Any, cast
 import pytest
 from robots import random_pairs, space
 
-from behaviours import BehaviourBank, Bundle, Priority
+from behaviours import BehaviourBank, Bundle, OneShot, Priority
 
 
 def three() -> BehaviourBank:
     bank = BehaviourBank(space(64))
     for seed, name in enumerate(("seek", "avoid", "cruise")):
-        bank.learn(name, random_pairs(8, seed))
+        bank.learn(name, random_pairs(8, seed), OneShot())
     return bank
 
 
