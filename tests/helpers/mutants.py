@@ -6,6 +6,7 @@ written them.
 """
 
 import argparse
+import copy
 import json
 import math
 import random
@@ -233,7 +234,7 @@ def _changed(rng: random.Random, about: dict[str, Any]) -> dict[str, Any]:
             case 3 if isinstance(parent, list):
                 parent.append(parent[key])
             case _:
-                parent[key] = rng.choice(HOSTILE)
+                parent[key] = copy.deepcopy(rng.choice(HOSTILE))
     return about
 
 
