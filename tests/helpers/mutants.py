@@ -226,13 +226,12 @@ def _changed(rng: random.Random, about: dict[str, Any]) -> dict[str, Any]:
             case 0:
                 parent.pop(key)
             case 1 if isinstance(parent, dict):
-                parent[rng.choice(["x", "", "name", "dim", "seed", "command", "variant", "levels"])] = rng.choice(
-                    HOSTILE
-                )
+                name = rng.choice(["x", "", "name", "dim", "seed", "command", "variant", "levels"])
+                parent[name] = copy.deepcopy(rng.choice(HOSTILE))
             case 2 if isinstance(parent, dict):
                 parent[rng.choice(["x", "", "a.b", "__init__", "name"])] = parent.pop(key)
             case 3 if isinstance(parent, list):
-                parent.append(parent[key])
+                parent.append(copy.deepcopy(parent[key]))
             case _:
                 parent[key] = copy.deepcopy(rng.choice(HOSTILE))
     return about
