@@ -132,15 +132,21 @@ class SelfShift(Protection):
             raise ShapeError(f"h must be one hypervector of d = {vsa.dim} elements; got shape {tuple(h.shape)}")
         if h is not None and h.dtype != vsa.dtype:
             raise ValueError(f"h must be a hypervector of {vsa}; got {h.dtype}")
+        self.register_buffer("columns", None, persistent=False)
+        self.register_buffer("places", None, persistent=False)
         self._own(seed if h is None else None)
         if h is not None:
             self.h = h
+            self.derive()
+
+    def derive(self) -> None:
+        """Compute the columns that find widths, which depend on the number of dimensions alone."""
         # Indices in base 128, so that their sums are exact products of int8 on any device.
-        places = 128 ** torch.arange(count)
-        digits = torch.arange(vsa.dim) // places[:, None] % 128
-        columns = torch.cat([torch.ones(1, vsa.dim, dtype=torch.int64), digits])
-        self.register_buffer("columns", columns.to(torch.int8), persistent=False)
-        self.register_buffer("places", places, persistent=False)
+        dim, device = self.vsa.dim, self.h.device
+        places = 128 ** torch.arange(_places(dim), device=device)
+        digits = torch.arange(dim, device=device) // places[:, None] % 128
+        ones = torch.ones(1, dim, dtype=torch.int64, device=device)
+        self.columns, self.places = torch.cat([ones, digits]).to(torch.int8), places
 
     def own_layout(self) -> Layout:
         """`h` `[d]`."""

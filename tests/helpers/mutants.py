@@ -309,7 +309,7 @@ def verdict(number: int, folder: Path) -> tuple[str, str]:
             loaded: Any = (BehaviourBank if kind == "bank" else Demonstrations).load(path)
     except (ValueError, OSError) as error:
         text = str(error)
-        if "alloc" in text or "memory" in text:
+        if "allocate" in text:  # the library's own refusals say what would be needed, before it is taken
             return damage, f"took too much memory before it was refused: {text[-80:]}"
         return damage, "refused" if str(path) in text else f"refused without naming the file: {text[:80]}"
     except BaseException as error:  # (what else comes out is the question here)

@@ -148,10 +148,10 @@ def _held(x: Tensor, begins: Tensor) -> Tensor:
 
 
 def check_lags(lags: Sequence[int]) -> tuple[int, ...]:
-    """The lags as a tuple. Raises `ValueError` unless they are whole numbers of steps, 1 or more, growing."""
+    """The lags as a tuple. Raises `ValueError` unless they are whole numbers of steps, growing, 1 to 100,000."""
     given = tuple(lags)
-    if any(isinstance(lag, bool) or not isinstance(lag, int) or lag < 1 for lag in given) or any(
+    if any(isinstance(lag, bool) or not isinstance(lag, int) or not 1 <= lag <= 100_000 for lag in given) or any(
         later <= sooner for sooner, later in pairwise(given)
     ):
-        raise ValueError(f"lags are growing numbers of steps, 1 or more; got {list(given)}")
+        raise ValueError(f"lags are growing numbers of steps, 1 or more (up to 100,000); got {list(given)}")
     return given
