@@ -96,7 +96,7 @@ class Behaviour(Controller):
             kept_items, folded = self._folding
             if _same(folded.program, program) and _same(folded.known, known) and _same(kept_items, items):
                 return folded
-        # Copies: whoever writes into the behaviour's own tensors, by whatever way, is found out by comparing.
+        # Copies, so that any write into the behaviour's own tensors is found by comparing values.
         copies = [part.clone() for part in parts]
         self._folding = copies[2], Folded(self.space.vsa, *copies)
         return self._folding[1]

@@ -115,12 +115,7 @@ class Demonstrations:
     @classmethod
     def load(cls, path: str | Path) -> "Demonstrations":
         """Read what `save` wrote. Raises `ValueError`, naming the file, for anything else."""
-        try:
-            tensors, about = load_tensors(path, "demonstrations")
-        except (ValueError, RecursionError) as error:
-            if str(path) in str(error):
-                raise
-            raise ValueError(f"{path} is not a readable torchvsa demonstrations file: {error}") from error
+        tensors, about = load_tensors(path, "demonstrations")
         try:
             _check_file(tensors, about)
             names = {key: about.get(key) for key in _NAMES}

@@ -174,7 +174,7 @@ def check_range(x: Float[Tensor, "*batch"]) -> None:
 
 
 def planned(part: P) -> P:
-    """A copy of a plan, to be drawn by whoever takes it; what is drawn already stays one and the same."""
+    """A copy of a plan, to be drawn by the part that takes it; a part that is drawn already is returned as it is."""
     return part if part.drawn else copy.deepcopy(part)
 
 
