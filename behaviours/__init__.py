@@ -8,9 +8,9 @@ from behaviours.composition import POLICIES, Bundle, Policy, Priority
 from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
 from behaviours.edges import quantile_edges
+from behaviours.frozen import FrozenBehaviour
 from behaviours.learning import RULES, ConvergenceWarning, ErrorDriven, Gradient, LeastSquares, OneShot, Rule
 from behaviours.recall import Recall
-from behaviours.reflex import Reflex
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Space
@@ -30,6 +30,7 @@ __all__ = [
     "ConvergenceWarning",
     "Demonstrations",
     "ErrorDriven",
+    "FrozenBehaviour",
     "Gradient",
     "LearningReport",
     "LeastSquares",
@@ -37,7 +38,6 @@ __all__ = [
     "Policy",
     "Priority",
     "Recall",
-    "Reflex",
     "Rule",
     "Schema",
     "Sensor",

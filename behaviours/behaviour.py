@@ -7,14 +7,14 @@ from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
 from behaviours.controller import Controller
-from behaviours.folding import Folded
+from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
-from behaviours.recall import Recall, scores
+from behaviours.recall import Recall, recalled
 from behaviours.report import LearningReport
 from behaviours.space import Space
-from torchvsa import VSA, ShapeError
+from torchvsa import VSA, Readout, ShapeError
 from torchvsa.blocks import by_blocks
-from torchvsa.exact import is_integer, norms, signed
+from torchvsa.exact import is_integer, signed
 
 
 class Behaviour(Controller):
@@ -48,7 +48,6 @@ class Behaviour(Controller):
             self.register_buffer("program", program)
         self.register_buffer("known", known)
         self.memory = ResultMemory(space, results)
-        self._folding: tuple[Tensor, Folded] | None = None
 
     def check(self) -> None:
         """Raise `ValueError` naming what could not be kept: see `BehaviourBank.save`."""
@@ -69,45 +68,34 @@ class Behaviour(Controller):
         """The stored results as levels of the actuators, in order of first insertion."""
         return self.memory.levels
 
+    def readout(self) -> Readout:
+        """The program, ready to be asked for each of `results`: see `VSA.readout`."""
+        return self.space.vsa.readout(self.program, self.memory.current_items())
+
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        folded = self._folded()
-        # Some rows at a time go all the way to a few products, so that their conditions never leave the cache.
-        products = by_blocks(
-            lambda rows: folded.products(self.space.encode(rows)), cells, row_bytes=self.space.vsa.row_bytes
+        readout = self.readout()
+        # Some rows at a time go all the way, so that their conditions, in float64, never leave the cache.
+        return by_blocks(
+            lambda rows: recalled(readout, self.known, self.memory.commands, self.space.encode(rows)),
+            cells,
+            row_bytes=8 * self.space.vsa.dim,
         )
-        return folded.recall(products, self.memory.commands)
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """Answer conditions that are encoded and protected already (Algorithm 2, lines 2 to 8)."""
-        folded = self._folded()
-        return folded.recall(folded.products(conditions), self.memory.commands)
+        return recalled(self.readout(), self.known, self.memory.commands, conditions)
 
-    def _folded(self) -> Folded:
-        """The folded program, kept for as long as what it was made of has the same values."""
-        program, known, items = self.program, self.known, self.memory.current_items()
-        parts = program, known, items
-        if (
-            torch.compiler.is_compiling()
-            or program.device.type != "cpu"  # comparing values would wait for it
-            or any(part.requires_grad for part in parts)
-        ):
-            return Folded(self.space.vsa, *parts)
-        if self._folding is not None:
-            kept_items, folded = self._folding
-            if _same(folded.program, program) and _same(folded.known, known) and _same(kept_items, items):
-                return folded
-        # Copies, so that any write into the behaviour's own tensors is found by comparing values.
-        copies = [part.clone() for part in parts]
-        self._folding = copies[2], Folded(self.space.vsa, *copies)
-        return self._folding[1]
+    def freeze(self) -> FrozenBehaviour:
+        """The read-only form, fastest to ask: see `FrozenBehaviour`."""
+        readout = self.space.vsa.readout(self.program.detach(), self.memory.current_items())
+        return FrozenBehaviour(self.space, readout, self.known, self.memory.commands)
 
     def scores(self, readings: Any) -> Float[Tensor, "batch k"]:
         """What recall compares: how strongly each of `results` is answered, `<unbind(program, c), item> / |item|`.
 
         In float64, and differentiable by the program, see `trainable`.
         """
-        items = self.memory.items
-        return scores(self.space.vsa, self.program, self.space.encode(self.space.cells(readings)), items, norms(items))
+        return self.readout()(self.space.encode(self.space.cells(readings)))
 
     def labels(self, commands: Any) -> Int64[Tensor, "batch"]:
         """Where each row of commands `[B, m]` stands in `results`; raises `ValueError` if it is not stored."""
@@ -165,7 +153,3 @@ def _check_vector(vsa: VSA, name: str, vector: Tensor) -> None:
         raise ValueError(f"{name} of {vsa} cannot be {vector.dtype}; it is one of {', '.join(map(str, kinds))}")
     if not vector.isfinite().all():
         raise ValueError(f"{name} holds values that are not finite")
-
-
-def _same(kept: Tensor, now: Tensor) -> bool:
-    return kept.dtype == now.dtype and kept.device == now.device and torch.equal(kept, now)

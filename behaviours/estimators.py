@@ -21,11 +21,9 @@ from behaviours.learning import Gradient, no_convergence_warnings
 from behaviours.learning.least_squares import solve
 from behaviours.progress import between
 from behaviours.quantiles import QuantileEncoding
-from behaviours.recall import scores
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator
 from behaviours.space import Space
-from torchvsa.exact import dots, norms
 
 
 class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
@@ -155,13 +153,9 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         check_is_fitted(self)
         readings = self._checked(X, reset=False)
         behaviour = self.behaviour_
-        items = behaviour.memory.items
         # In float64 a row scores the same, to all digits shown, whatever other rows it stands among.
-        program, lengths = behaviour.program.double(), norms(items)
-        rows = [
-            scores(behaviour.space.vsa, program, block, items, lengths)
-            for block in self._conditions(behaviour.space, readings)
-        ]
+        readout = behaviour.readout().of(behaviour.program.double())
+        rows = [readout(block) for block in self._conditions(behaviour.space, readings)]
         # The clean-up memory is in order of first insertion, the columns in that of the classes.
         columns: Int64[Tensor, "K"] = behaviour.results[:, 0].argsort()
         return torch.cat(rows)[:, columns].numpy()
@@ -254,8 +248,10 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
         """The values that the program answers, `[N]` or `[N, m]` as in `fit`."""
         check_is_fitted(self)
         readings = self._checked(X, reset=False)
-        folded = self.space_.vsa.unbind(self.program_.double(), self.space_.results.roles)
-        answers = torch.cat([dots(block, folded) for block in self._conditions(self.space_, readings)])
+        readout = self.space_.vsa.readout(self.program_.double(), self.space_.results.roles)
+        scores = torch.cat([readout(block) for block in self._conditions(self.space_, readings)])
+        # A product with a role, not with a role of length 1.
+        answers = scores * readout.lengths
         with np.errstate(over="ignore"):
             values = answers.numpy() * self.scale_ + self.mean_
         # Answers a little beyond the values shown may be beyond the largest float.

@@ -1,4 +1,4 @@
-"""What a behaviour answers, and the linear algebra by which it finds the answer."""
+"""What a behaviour answers."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -8,8 +8,8 @@ from jaxtyping import Float, Float64, Int64, Shaped
 from torch import Tensor
 
 from behaviours.ordered import distinct_rows
-from torchvsa import VSA
-from torchvsa.exact import divide, dots
+from torchvsa import Readout
+from torchvsa.exact import dots, in_units, norms, scaled
 
 
 class Recall(NamedTuple):
@@ -57,16 +57,19 @@ def asked_once(answer: Callable[[Shaped[Tensor, "some w"]], Recall], cells: Shap
     return answer(distinct).rows(which)
 
 
-def scores(
-    vsa: VSA,
-    program: Shaped[Tensor, "d"],
+def recalled(
+    readout: Readout,
+    known: Shaped[Tensor, "d"],
+    commands: Float64[Tensor, "k m"],
     conditions: Shaped[Tensor, "batch d"],
-    items: Shaped[Tensor, "k d"],
-    lengths: Float64[Tensor, "k"],
-) -> Float64[Tensor, "batch k"]:
-    """How strongly the program answers each condition with each item: `<unbind(program, c), item> / |item|`.
+) -> Recall:
+    """Answer encoded and protected conditions with the best item's row of `commands` (Algorithm 2, lines 2 to 8)."""
+    match = readout.match(conditions)
+    return Recall(commands[match.index], match.similarity, match.margin, familiarity(conditions, known))
 
-    Recall is linear until the clean-up, `<c ⊗ p, item> = <c, p ⊗ item>`, so the program is folded into the
-    items and a batch of queries is one matrix product.
-    """
-    return divide(dots(conditions, vsa.unbind(program, items)).to(torch.float64), lengths)
+
+def familiarity(conditions: Shaped[Tensor, "batch d"], known: Shaped[Tensor, "d"]) -> Float[Tensor, "batch"]:
+    """The cosine of each condition with the sum of the known ones; 0 where one of them is a zero vector."""
+    known, _ = in_units(known)
+    products = dots(conditions, known[None])[:, 0]
+    return scaled(products.to(torch.float64), norms(conditions) * norms(known)).to(torch.float32)

@@ -6,7 +6,7 @@ from typing import Any
 import torch
 from torch.testing import assert_close
 
-from behaviours import OneShot, Reflex
+from behaviours import OneShot
 from benchmarks import corral
 from benchmarks.harness import INPUTS, Case
 from benchmarks.literal import Literal
@@ -25,7 +25,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     literal.learn(space.cells(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)
     options: Any = {"guard_filter_fn": torch.compiler.skip_guard_on_all_nn_modules_unsafe}
-    compiled: Any = torch.compile(Reflex(behaviour), fullgraph=True, dynamic=False, options=options)
+    compiled: Any = torch.compile(behaviour.freeze(), fullgraph=True, dynamic=False, options=options)
     for name, ask, rows, differ in (
         ("Algorithm 2", behaviour, batch, False),
         ("Algorithm 2, all different", behaviour, batch, True),

@@ -7,9 +7,7 @@ from torch import Tensor
 
 from behaviours import Behaviour, Space
 from behaviours.ordered import distinct_rows
-from behaviours.recall import scores
 from experiments.damage import PARTS, Array, Damage, Floats, Learner
-from torchvsa.exact import norms
 
 
 class DamagedProgram:
@@ -27,6 +25,7 @@ class DamagedProgram:
     def results(self, bins: Tensor, conditions: Tensor | None = None) -> NDArray[np.int64]:
         """Which result wins for each row of bins; `conditions` are their codes, if they are known already."""
         winners = []
+        readout = self.space.vsa.readout(self.program, self.items)
         for start in range(0, len(bins), 512):
             rows = slice(start, start + 512)
             codes = self.space.encode(bins[rows]) if conditions is None else conditions[rows]
@@ -36,8 +35,7 @@ class DamagedProgram:
                     for code, key in zip(codes.double().numpy(), (bins[rows] + 1).tolist(), strict=True)
                 ]
                 codes = torch.from_numpy(np.stack(damaged))
-            answers = scores(self.space.vsa, self.program, codes.double(), self.items, norms(self.items))
-            winners.append(answers.argmax(-1).numpy())
+            winners.append(readout(codes.double()).argmax(-1).numpy())
         return np.concatenate(winners)
 
     def __call__(self, sensors: Floats) -> Floats:

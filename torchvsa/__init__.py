@@ -7,6 +7,7 @@ from torchvsa.errors import ShapeError
 from torchvsa.memory import CleanUp, Match
 from torchvsa.part import Part
 from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected, protection
+from torchvsa.readout import Readout
 
 __version__ = "0.1.0"
 
@@ -23,6 +24,7 @@ __all__ = [
     "Match",
     "Part",
     "Protection",
+    "Readout",
     "SelfShift",
     "ShapeError",
     "Unprotected",

@@ -169,6 +169,14 @@ def in_range(
     return x, root(paired_dots(x, x)), unit
 
 
+def in_units(x: Shaped[Tensor, "*batch d"]) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch 1"] | None]:
+    """Floats as `in_range` has them, with the `units` that divided them; integers and bits as they are."""
+    if is_integer(x):
+        return x, None
+    x, _, unit = in_range(x)
+    return x, unit
+
+
 def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
     # Floats are summed fastest, and are exact below 2^24, which 1,023 squares of int8 cannot reach.
     squares = x.to(torch.float32)

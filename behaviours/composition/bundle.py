@@ -11,10 +11,10 @@ from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
 from behaviours.ordered import distinct_rows
-from behaviours.recall import Recall, scores
+from behaviours.recall import Recall
 from behaviours.report import LearningReport
 from torchvsa import VSA
-from torchvsa.exact import is_integer, norms, signed
+from torchvsa.exact import is_integer, signed
 
 
 class Bundle(Policy):
@@ -58,16 +58,13 @@ class Bundle(Policy):
 
     def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """See `Policy.ask`."""
-        vsa, items = self.space.vsa, self.behaviour.memory.items
-        lengths = norms(items)
-        winner = scores(vsa, self.behaviour.program, conditions, items, lengths).argmax(-1)
-        shares = [
-            weight * scores(vsa, part.program, conditions, items, lengths).gather(-1, winner[:, None])[:, 0]
-            if weight
-            else torch.full_like(winner, -torch.inf, dtype=torch.float64)
-            for part, weight in zip(self.parts, self.weights, strict=True)
-        ]
-        return self.behaviour.ask(conditions)._replace(speaker=torch.stack(shares).argmax(0))
+        scores = self.behaviour.readout()(conditions)
+        # The score of the sum is the weighted sum of the scores that the behaviours give.
+        parts = self.behaviour.readout().of(stacked([part.program for part in self.parts]))(conditions)
+        weights = torch.tensor(self.weights, dtype=torch.float64, device=scores.device)
+        winner = scores.argmax(-1)[:, None, None].expand(-1, len(weights), 1)
+        shares = (weights * parts.gather(-1, winner)[..., 0]).masked_fill(weights == 0, -torch.inf)
+        return self.behaviour.ask(conditions)._replace(speaker=shares.argmax(-1))
 
 
 def weighted_sum(vsa: VSA, weights: Sequence[float], vectors: Sequence[Shaped[Tensor, "d"]]) -> Shaped[Tensor, "d"]:
@@ -75,11 +72,8 @@ def weighted_sum(vsa: VSA, weights: Sequence[float], vectors: Sequence[Shaped[Te
 
     Raises `ValueError` if its elements could be larger than 2^53, or if all of them lie below 2^-53.
     """
-    # Raw and clipped programs (smaller types, bits that stand for votes) may stand side by side.
-    votes = [signed(vector) for vector in vectors]
-    wide = reduce(torch.promote_types, (vote.dtype for vote in votes))
-    rows = torch.stack([vote.to(wide) for vote in votes])
-    sizes = [vote.to(torch.int64 if is_integer(vote) else vote.dtype).abs().max().item() for vote in votes]
+    rows = stacked(vectors)
+    sizes = rows.to(torch.int64 if is_integer(rows) else rows.dtype).abs().amax(-1).tolist()
     largest = sum(abs(weight) * size for weight, size in zip(weights, sizes, strict=True))
     if largest > _LARGEST or 0 < largest < 1 / _LARGEST:
         raise ValueError(
@@ -89,6 +83,13 @@ def weighted_sum(vsa: VSA, weights: Sequence[float], vectors: Sequence[Shaped[Te
     if is_integer(rows) and all(isinstance(weight, int) for weight in weights) and largest >= 2**31:
         return (rows.to(torch.float64) * torch.tensor(weights, dtype=torch.float64, device=rows.device)[:, None]).sum(0)
     return vsa.superpose(rows, weights=torch.tensor(weights, device=rows.device))
+
+
+def stacked(vectors: Sequence[Shaped[Tensor, "d"]]) -> Shaped[Tensor, "b d"]:
+    """Programs `[b, d]` in one type: raw and clipped ones (smaller types, bits that count as votes) may be mixed."""
+    votes = [signed(vector) for vector in vectors]
+    wide = reduce(torch.promote_types, (vote.dtype for vote in votes))
+    return torch.stack([vote.to(wide) for vote in votes])
 
 
 _LARGEST = 2**53

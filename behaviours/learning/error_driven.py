@@ -17,7 +17,6 @@ from behaviours.learning.convergence import warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import flag, number, store, whole
 from behaviours.progress import Progress, between, silent
-from behaviours.recall import scores
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa.exact import is_integer, norms, signed
@@ -192,10 +191,10 @@ class _Pairs:
         margin: float,
     ) -> None:
         self.vsa, self.conditions, self.targets, self.items = vsa, conditions, targets, items
-        self.lengths = norms(items)
+        self.readout = vsa.readout(torch.zeros(vsa.dim, dtype=vsa.accumulator, device=items.device), items)
         # The score of one stored pair for itself, by which margins are measured.
-        unit = torch.cat([norms(vsa.bind(c, items[t])) ** 2 for c, t in _blocks(conditions, targets)])
-        self.wanted = margin * unit / self.lengths[targets]
+        unit = torch.cat([norms(vsa.bind(items[t], c)) ** 2 for c, t in _blocks(conditions, targets)])
+        self.wanted = margin * unit / norms(items)[targets]
 
     def __len__(self) -> int:
         return len(self.targets)
@@ -218,13 +217,13 @@ class _Pairs:
     def change(self, pair: int, rival: int | None) -> Shaped[Tensor, "d"]:
         """What sets a pair right: the pair itself, less its condition with the rival result, if there is one."""
         condition = self.conditions[pair]
-        change = self.vsa.superpose(self.vsa.bind(condition, self.items[int(self.targets[pair])])[None])
+        change = self.vsa.superpose(self.vsa.bind(self.items[int(self.targets[pair])], condition)[None])
         if rival is not None:
-            change = change - self.vsa.superpose(self.vsa.bind(condition, self.items[rival])[None])
+            change = change - self.vsa.superpose(self.vsa.bind(self.items[rival], condition)[None])
         return change
 
     def _scores(self, program: Shaped[Tensor, "d"], start: int, size: int) -> Float64[Tensor, "some r"]:
-        return scores(self.vsa, program, self.conditions[start : start + size], self.items, self.lengths)
+        return self.readout.of(program)(self.conditions[start : start + size])
 
     def _judge(
         self, answers: Float64[Tensor, "some r"], start: int

@@ -18,7 +18,7 @@ from behaviours.options import flag, number, store, whole
 from behaviours.progress import Progress, between, silent
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import dots, norms, signed
+from torchvsa.exact import signed
 
 Loss = Literal["cross_entropy", "hinge", "squared"]
 Output = Literal["float", "bipolar", "int8"]
@@ -176,10 +176,10 @@ class _Training:
         before: Behaviour | None = None,
     ) -> None:
         self.rule, self.vsa, self.samples, self.items = rule, vsa, samples, items
-        self.lengths = norms(items)
         wide = torch.float32 if vsa.integer else vsa.dtype
         self.complex = wide.is_complex
         zero = torch.zeros(vsa.dim, dtype=wide, device=items.device)
+        self.readout = vsa.readout(zero, items)
         program = zero if before is None else signed(before.program).detach().to(wide, copy=True)
         start = torch.view_as_real(program) if self.complex else program
         if rule.sparse:
@@ -215,11 +215,10 @@ class _Training:
         return self._recall(program, self.samples.condition[rows])
 
     def _recall(self, program: Shaped[Tensor, "d"], which: Int64[Tensor, "batch"]) -> Float[Tensor, "batch r"]:
-        """The same for conditions; `<c ⊗ p, r> = <c, p ⊗ r>`, so the program is folded into the results."""
+        """The same for conditions."""
         # Whole rows are copied far faster by index_select than by an index.
         conditions = self.samples.conditions.index_select(0, which)
-        answers = dots(conditions, self.vsa.unbind(program, self.items))
-        return answers / self.lengths.to(answers.dtype)
+        return self.readout.of(program)(conditions)
 
     def loss(self, rows: Int64[Tensor, "batch"]) -> Float[Tensor, ""]:
         """The mean loss of some samples."""

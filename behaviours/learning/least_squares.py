@@ -14,10 +14,9 @@ from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import number, store
 from behaviours.progress import Progress, between, silent
-from behaviours.recall import scores
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import is_integer, norms, signed
+from torchvsa.exact import is_integer, signed
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,7 @@ class LeastSquares(Rule):
         targets = counts / counts.sum(1, keepdim=True)
         conditions = samples.conditions[:]
         program = solve(space.vsa, conditions, items, targets, self.ridge, between(progress, 0.2, 0.9))
-        said = scores(space.vsa, program, conditions, items, norms(items)).argmax(1)
+        said = space.vsa.readout(program, items)(conditions).argmax(1)
         report = samples.report(
             self.name,
             contradicting=int((counts.argmax(1)[shown.condition] != shown.result).sum()),

@@ -109,7 +109,7 @@ class Sums:
     def _pairs(self, block: _Block, rows: Tensor | slice) -> Shaped[Tensor, "N 2 d"]:
         """What Algorithm 1 adds in lines 6 and 7: for each row its pair, and its condition."""
         conditions = block.conditions[block.condition[rows]]
-        return torch.stack([self.vsa.bind(conditions, self.items[block.result[rows]]), conditions], 1)
+        return torch.stack([self.vsa.bind(self.items[block.result[rows]], conditions), conditions], 1)
 
     def _add(self, block: _Block, rows: list[int] | slice) -> None:
         for some in torch.arange(len(block))[rows].split(_DISTINCT):

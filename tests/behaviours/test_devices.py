@@ -25,7 +25,6 @@ from behaviours import (
     Gradient,
     OneShot,
     Policy,
-    Reflex,
     Rule,
     Space,
 )
@@ -222,7 +221,7 @@ def check_learning(rule: Rule, name: str) -> None:
     alike(here, moved(here), exact=True)
     alike(here.clipped(), away.clipped(), exact=False)
     alike(here.trainable(), away.trainable(), exact=False)
-    answers_alike(Reflex(here), Reflex(away))
+    answers_alike(here.freeze(), away.freeze())
     try:
         here = rule.partial_fit(here, random_pairs(20, seed=1))
     except ValueError:

@@ -375,3 +375,11 @@ def test_files_of_format_2_are_read_by_all_later_versions() -> None:
     steer = BehaviourBank.load(FILES / "bank_format_2.safetensors")["steer towards. é"]
     recall, _ = steer.step(shown.sensors, steer.start(range(4)))
     assert torch.equal(recall.commands, shown.commands)
+
+
+def test_tensors_of_any_strides_are_written(tmp_path: Path) -> None:
+    tensors = {"one": torch.ones(1, 2, dtype=torch.float16)[:, :1].mT, "turned": torch.arange(6).view(2, 3).mT}
+    path = save_tensors(tmp_path / "file", "bank", tensors, {})
+    loaded, _ = load_tensors(path, "bank")
+    assert torch.equal(loaded["one"], tensors["one"])
+    assert torch.equal(loaded["turned"], tensors["turned"])

@@ -167,7 +167,8 @@ def _opened(content: bytes, folder: Path) -> tuple[str, dict[str, Tensor], dict[
     path.write_bytes(content)
     head = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")])
     kind = json.loads(head["__metadata__"]["torchvsa"])["kind"]
-    return kind, *load_tensors(path, kind)
+    tensors, about = load_tensors(path, kind)
+    return kind, dict(sorted(tensors.items())), about  # (they are read in any order)
 
 
 def _forged(content: bytes, folder: Path, change: Callable[[dict[str, Tensor], dict[str, Any]], Any]) -> bytes:

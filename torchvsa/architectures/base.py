@@ -17,6 +17,7 @@ from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
 from torchvsa.exact import cosines, is_integer, norms, signed
 from torchvsa.operators import entries, rotated
+from torchvsa.readout import Readout
 
 Summands = Shaped[Tensor, "..."] | Sequence[Shaped[Tensor, "..."]]
 """Hypervectors to bundle: stacked in one tensor, or in a list or tuple."""
@@ -40,7 +41,7 @@ class VSA(ABC):
     commutative: ClassVar[bool] = True
     """Whether `bind(a, b)` equals `bind(b, a)`."""
     bilinear: ClassVar[bool] = True
-    """Whether `bind` is linear in each argument, so that it distributes over raw accumulators."""
+    """Whether `bind` and `unbind` are linear in the key as well, so that programs can be folded into items."""
     self_inverse: bool = False
     """Whether `bind` with the same key undoes itself."""
     negatable: ClassVar[bool] = True
@@ -102,13 +103,17 @@ class VSA(ABC):
 
     @abstractmethod
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """Join two hypervectors into one that is dissimilar to both. Commutes and is linear in each argument."""
+        """Join two hypervectors into one that is dissimilar to both; `b` is the key.
+
+        Linear in `a`, so that it distributes over raw accumulators. Whether it is in `b` too, and whether it commutes,
+        the architecture says (`bilinear`, `commutative`).
+        """
 
     @abstractmethod
     def unbind(
         self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
-        """Undo `bind`: `unbind(bind(a, key), key)` is (or resembles) `a`."""
+        """Undo `bind`: `unbind(bind(a, key), key)` is (or resembles) `a`. Linear in `bound`."""
 
     @abstractmethod
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
@@ -256,6 +261,22 @@ class VSA(ABC):
     ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate `x` from `bundle([x, known])`, given `known`."""
         return bundled - known
+
+    def fold(
+        self, program: Shaped[Tensor, "*#batch d"], item: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
+        """The vector to compare keys with: `<fold(program, item), key> = <unbind(program, key), item>`.
+
+        `readout` needs it where `bind` is bilinear. Where it commutes, this is `unbind(program, item)`; an architecture
+        that does not commute implements its own.
+        """
+        if not self.commutative:
+            raise NotImplementedError(f"{self.name} is bilinear and does not commute; it must implement fold")
+        return self.unbind(program, item)
+
+    def readout(self, programs: Shaped[Tensor, "*b d"], items: Shaped[Tensor, "K d"]) -> Readout:
+        """Ask one program `[d]`, or a stack `[b, d]`, for items `[K, d]`: see `Readout`."""
+        return Readout(self, programs, items)
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """`norms(unbind(program, key))` for each key, in float64, without building the vectors where that pays."""

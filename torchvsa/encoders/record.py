@@ -142,7 +142,7 @@ class Record(Encoder):
 
     def _bound(self, roles: Shaped[Tensor, "n 1 d"], codes: Shaped[Tensor, "#n k d"]) -> Shaped[Tensor, "n k d"]:
         """The role-bound codes."""
-        return self.vsa.bind(roles, codes)
+        return self.vsa.bind(codes, roles)
 
     @abstractmethod
     def _absent(self, like: Shaped[Tensor, "..."]) -> Shaped[Tensor, "d"]:

@@ -77,10 +77,33 @@ def _bind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
     xs, key, weights = _draw(vsa, 6), _draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
     raw = vsa.superpose(xs, weights=weights)
     assert_close(vsa.permute(raw, 7), vsa.superpose(vsa.permute(xs, 7), weights=weights))
+    assert_close(vsa.bind(raw, key), vsa.superpose(vsa.bind(xs, key), weights=weights))
     if vsa.bilinear:
-        assert_close(vsa.bind(raw, key), vsa.superpose(vsa.bind(xs, key), weights=weights))
         assert_close(vsa.bind(key, raw), vsa.superpose(vsa.bind(key, xs), weights=weights))
-        assert_close(vsa.unbind(raw, key), vsa.superpose(vsa.unbind(xs, key), weights=weights))
+        assert_close(vsa.unbind(key, raw), vsa.superpose(vsa.unbind(key, xs), weights=weights))
+
+
+def _unbind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
+    xs, key, weights = _draw(vsa, 6), _draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
+    raw = vsa.superpose(xs, weights=weights)
+    assert_close(vsa.unbind(raw, key), vsa.superpose(vsa.unbind(xs, key), weights=weights))
+
+
+def _a_readout_unbinds_and_compares(vsa: VSA) -> None:
+    programs, conditions, items = (
+        vsa.superpose(_draw(vsa, 2, 9), -2),
+        vsa.bundle(_draw(vsa, 4, 3, seed=1)),
+        _draw(vsa, 5),
+    )
+    for program in (programs[0], programs):
+        noisy = vsa.unbind(program, conditions if program.dim() == 1 else conditions[:, None])
+        cosines = vsa.similarity(noisy[..., None, :], items).double()
+        readout = vsa.readout(program, items)
+        assert_close(readout(conditions), cosines * norms(noisy)[..., None], rtol=1e-5, atol=1e-5)
+        match, top = readout.match(conditions), cosines.float().topk(2)
+        assert_close(match.index, top.indices[..., 0])
+        assert_close(match.similarity, top.values[..., 0], rtol=1e-5, atol=1e-6)
+        assert_close(match.margin, top.values[..., 0] - top.values[..., 1], rtol=1e-5, atol=1e-6)
 
 
 def _superpose_adds_up(vsa: VSA) -> None:
@@ -249,6 +272,8 @@ _LAWS: tuple[Callable[[VSA], None], ...] = (
     _unbind_undoes_bind,
     _the_identity_binds_to_nothing,
     _bind_is_linear_over_a_raw_accumulator,
+    _unbind_is_linear_over_a_raw_accumulator,
+    _a_readout_unbinds_and_compares,
     _superpose_adds_up,
     _a_bundle_resembles_its_members_only,
     _a_bundle_does_not_depend_on_order,

@@ -1,22 +1,19 @@
-"""Programs folded into what they answer with: the same answers, whatever the size of their numbers."""
+"""Behaviours answer by what their tensors hold now, whatever the size of the numbers."""
 
 import copy
 import math
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 import plain
 import pytest
 import torch
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from robots import random_pairs, same_bits, space
+from throwaway import Hashed, Turned
 from torch.testing import assert_close
 
-from behaviours import Behaviour, ErrorDriven, OneShot, Recall, Reflex
-from behaviours.folding import Folded, _digits, _joined
-from torchvsa import ARCHITECTURES, MAP
+from behaviours import Behaviour, ErrorDriven, Gradient, OneShot, Recall, Rule
+from torchvsa import MAP, VSA
 
 READINGS = [*random_pairs(20).sensors.tolist(), [math.nan, 3.3, 19.0], [math.nan] * 3]
 
@@ -25,37 +22,7 @@ def same(a: Recall, b: Recall) -> bool:
     return all(same_bits(x, y) for x, y in zip(a[:4], b[:4], strict=True))
 
 
-@given(st.lists(st.integers(-(2**40), 2**40), min_size=1, max_size=6))
-@settings(max_examples=50, deadline=None)
-def test_digits_are_the_numbers(numbers: list[int]) -> None:
-    # As many rows of numbers of one element, and one row of many.
-    for rows in (torch.tensor(numbers)[:, None], torch.tensor([numbers])):
-        digits, weights = _digits(rows, 8)
-        assert digits.dtype == torch.int8
-        assert torch.equal(_joined(digits.T, weights).T, rows.to(torch.float64))
-
-
-@pytest.mark.parametrize("largest", [1, 127, 128, 40_000, 2**31 - 1])
-@pytest.mark.parametrize("vsa", ["MAP-C", "BSC", "MAP-B"])
-def test_products_are_exact_for_programs_of_any_size(vsa: str, largest: int) -> None:
-    made = space(301, vsa)
-    generator = torch.Generator().manual_seed(0)
-    program = torch.randint(-largest, largest + 1, (301,), generator=generator, dtype=torch.int64).to(torch.int32)
-    results = OneShot().fit(made, random_pairs(20)).results
-    items, conditions = made.items(results), made.encode(made.cells(READINGS[:20]))
-    folded = Folded(made.vsa, program, program, items)
-    assert folded.digital
-    products = folded.products(conditions)
-    codes = plain.wide(conditions).real
-    noise = codes * program.double().numpy()
-    lengths = (plain.wide(items).real ** 2).sum(1) ** 0.5
-    assert_close(
-        (products.items / folded.item_lengths).numpy(), noise @ plain.wide(items).real.T / lengths, rtol=1e-15, atol=0
-    )
-    assert_close(products.noise.numpy(), (noise**2).sum(1) ** 0.5, rtol=1e-15, atol=0)
-
-
-def test_a_changed_program_is_folded_anew() -> None:
+def test_a_changed_program_answers_at_once() -> None:
     behaviour = OneShot().fit(space(200), random_pairs(20))
     before = behaviour(READINGS)
     behaviour.program.mul_(-1)
@@ -125,35 +92,6 @@ def test_programs_made_without_versions_are_asked_as_well() -> None:
     assert same(recall, OneShot().fit(space(200), random_pairs(20))(READINGS))
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
-def test_a_reflex_answers_as_its_behaviour(vsa: str) -> None:
-    behaviour = ErrorDriven().fit(space(200, vsa), random_pairs(20))
-    expected = behaviour(READINGS)
-    reflex = Reflex(behaviour)
-    assert same(reflex(READINGS), expected)
-    for row, reading in enumerate(READINGS):
-        single = reflex([reading])
-        for part, whole in zip(single[:4], expected[:4], strict=True):
-            assert_close(part[0], whole[row], equal_nan=True)
-
-
-def test_a_reflex_keeps_what_its_behaviour_was() -> None:
-    behaviour = OneShot().fit(space(200), random_pairs(20))
-    reflex, before = Reflex(behaviour), behaviour(READINGS)
-    behaviour.program = torch.zeros_like(behaviour.program)
-    assert same(reflex(READINGS), before)
-
-
-@pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:`torch.jit:DeprecationWarning")  # of its own parts
-def test_a_compiled_reflex_answers_the_same() -> None:
-    behaviour = OneShot().fit(space(512), random_pairs(20))
-    tick: Any = torch.compile(Reflex(behaviour), fullgraph=True)
-    for reading in READINGS[-4:]:
-        row = torch.tensor([reading], dtype=torch.float64)
-        assert same(tick(row), behaviour(row))
-
-
 def test_conditions_in_a_wider_type_are_asked_the_plain_way() -> None:
     made = space(200, "MAP-I")
     behaviour = OneShot().fit(made, random_pairs(20))
@@ -165,3 +103,20 @@ def test_conditions_in_a_wider_type_are_asked_the_plain_way() -> None:
         assert answer[0].tolist() == expected.commands
         for got, wanted in zip(answer[1:], expected[1:], strict=True):
             assert got.item() == pytest.approx(wanted, abs=1e-6)
+
+
+@pytest.mark.parametrize("rule", [OneShot(), ErrorDriven(), Gradient()], ids=lambda rule: rule.name)
+@pytest.mark.parametrize("vsa", [Turned(2000), Turned(2000, torch.float32), Hashed(2000)], ids=repr)
+@pytest.mark.parametrize("protection", ["none", "self_shift"])
+def test_what_does_not_commute_or_is_not_bilinear_learns_and_answers(vsa: VSA, rule: Rule, protection: str) -> None:
+    shown = random_pairs(20)
+    behaviour = rule.fit(space(vsa=vsa, protection=protection), shown)
+    recall = behaviour(shown.sensors)
+    right = (recall.commands == shown.commands).all(1).double().mean()
+    # Pairs that are only added once disturb each other where conditions share readings.
+    assert right > 0.8 if isinstance(rule, OneShot) else right == 1
+    assert (recall.familiarity > 0.1).all()
+    other = rule.fit(behaviour.space, random_pairs(20, seed=1))
+    assert not torch.equal(other(shown.sensors).commands, shown.commands)
+    for row, reading in enumerate(shown.sensors.tolist()):
+        assert torch.equal(behaviour([reading]).commands[0], recall.commands[row])

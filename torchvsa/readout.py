@@ -1,0 +1,110 @@
+"""Read items out of programs: unbind a condition, compare what is left with the items."""
+
+from typing import TYPE_CHECKING
+
+import torch
+from jaxtyping import Float64, Shaped
+from torch import Tensor, nn
+
+from torchvsa.blocks import by_blocks
+from torchvsa.errors import ShapeError
+from torchvsa.exact import dots, in_units, is_integer, norms, scaled, signed
+from torchvsa.memory import Match, best
+
+if TYPE_CHECKING:
+    from torchvsa.architectures.base import VSA
+
+
+class Readout(nn.Module):
+    """How strongly programs answer conditions with items: `<unbind(program, condition), item> / |item|`.
+
+        readout = vsa.readout(programs, items)
+        readout(conditions)              # scores, [B, K] or [B, b, K]
+        readout.match(conditions)        # the best item of each: index, similarity, margin
+
+    `programs` is one hypervector `[d]` or a stack `[b, d]`, raw accumulators included; `items` are `[K, d]`. Where
+    `bind` is bilinear, programs are folded into the items, `<unbind(p, c), item> = <fold(p, item), c>`, so that a batch
+    of conditions is one matrix product (see `VSA.fold`); elsewhere the steps are taken one after the other.
+
+    Products of integers are exact, as in `dots`: their scores depend neither on the batch nor on threads. Scores are
+    float64 and differentiable by programs and conditions.
+
+    A readout holds what was folded; later changes of `programs` and `items` do not reach it. `of` makes one for other
+    programs over the same items.
+
+    Source: Neubert et al. 2016, Algorithm 2, lines 2 and 3. Raises `ShapeError` for other shapes.
+    """
+
+    programs: Tensor
+    items: Tensor
+    lengths: Tensor
+    units: Tensor | None
+    folded: Tensor | None
+
+    def __init__(self, vsa: "VSA", programs: Shaped[Tensor, "*b d"], items: Shaped[Tensor, "K d"]) -> None:
+        super().__init__()
+        vsa.check(programs, "programs")
+        vsa.check(items, "items")
+        if programs.dim() > 2 or items.dim() != 2 or len(items) == 0:
+            raise ShapeError(
+                f"a readout takes programs [d] or [b, d] and items [K, d], K at least 1; got shapes "
+                f"{tuple(programs.shape)} and {tuple(items.shape)}"
+            )
+        self.vsa = vsa
+        self.register_buffer("items", in_units(items)[0], persistent=False)
+        self.register_buffer("lengths", norms(self.items), persistent=False)
+        self._read(programs)
+
+    def _read(self, programs: Shaped[Tensor, "*b d"]) -> None:
+        # Scores grow with the program, cosines do not: powers of two bring floats into range, and change no digit.
+        programs, units = in_units(programs)
+        self.register_buffer("programs", programs, persistent=False)
+        self.register_buffer("units", units, persistent=False)
+        folded = self.vsa.fold(_wide(programs, self.items)[..., None, :], self.items) if self.vsa.bilinear else None
+        self.register_buffer("folded", folded, persistent=False)
+
+    def of(self, programs: Shaped[Tensor, "*b d"]) -> "Readout":
+        """A readout of other programs with the same items."""
+        other = Readout.__new__(Readout)
+        nn.Module.__init__(other)
+        other.vsa = self.vsa
+        other.register_buffer("items", self.items, persistent=False)
+        other.register_buffer("lengths", self.lengths, persistent=False)
+        other._read(programs)
+        return other
+
+    def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
+        """The score of each item for each condition."""
+        scores = scaled(self._products(conditions).to(torch.float64), self.lengths)
+        return scores if self.units is None else scores * self.units.to(torch.float64)
+
+    def match(self, conditions: Shaped[Tensor, "batch d"]) -> Match:
+        """The item that resembles each noisy result most: `[B]` or `[B, b]`, see `CleanUp`."""
+        if self.vsa.bilinear and is_integer(conditions):
+            # Products and lengths are found in float64, in which a row need be written once only.
+            conditions = signed(conditions).to(torch.float64)
+        products = self._products(conditions)
+        return best(scaled(products.to(torch.float64), self.lengths), self._noise(conditions))
+
+    def _products(self, conditions: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch *b K"]:
+        self.vsa.check(conditions, "conditions")
+        shape = *self.programs.shape[:-1], len(self.items)
+        if self.folded is not None:
+            return dots(conditions, self.folded.flatten(0, -2)).unflatten(-1, shape)
+        row_bytes = self.programs.numel() * max(self.programs.element_size(), 4)
+        return by_blocks(lambda rows: dots(self._unbound(rows), self.items), conditions, row_bytes=row_bytes)
+
+    def _noise(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b"]:
+        """The length of each noisy result, `|unbind(program, condition)|`."""
+        if self.programs.dim() == 1:
+            return self.vsa.unbound_norm(self.programs, conditions)
+        return torch.stack([self.vsa.unbound_norm(program, conditions) for program in self.programs], -1)
+
+    def _unbound(self, conditions: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch *b d"]:
+        return self.vsa.unbind(self.programs, conditions if self.programs.dim() == 1 else conditions[:, None])
+
+
+def _wide(programs: Tensor, items: Tensor) -> Tensor:
+    """Programs in a type that holds their products with the items: items that are sums themselves may pass int32."""
+    sums = is_integer(programs) and is_integer(items) and programs.element_size() == items.element_size() == 4
+    return programs.to(torch.int64) if sums else programs
