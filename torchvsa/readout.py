@@ -41,7 +41,13 @@ class Readout(nn.Module):
     units: Tensor | None
     folded: Tensor | None
 
-    def __init__(self, vsa: "VSA", programs: Shaped[Tensor, "*b d"], items: Shaped[Tensor, "K d"]) -> None:
+    def __init__(
+        self,
+        vsa: "VSA",
+        programs: Shaped[Tensor, "*b d"],
+        items: Shaped[Tensor, "K d"],
+        lengths: Float64[Tensor, "K"] | None = None,
+    ) -> None:
         super().__init__()
         vsa.check(programs, "programs")
         vsa.check(items, "items")
@@ -50,28 +56,20 @@ class Readout(nn.Module):
                 f"a readout takes programs [d] or [b, d] and items [K, d], K at least 1; got shapes "
                 f"{tuple(programs.shape)} and {tuple(items.shape)}"
             )
-        self.vsa = vsa
-        self.register_buffer("items", in_units(items)[0], persistent=False)
-        self.register_buffer("lengths", norms(self.items), persistent=False)
-        self._read(programs)
-
-    def _read(self, programs: Shaped[Tensor, "*b d"]) -> None:
         # Scores grow with the program, cosines do not: powers of two bring floats into range, and change no digit.
         programs, units = in_units(programs)
-        self.register_buffer("programs", programs, persistent=False)
-        self.register_buffer("units", units, persistent=False)
-        folded = self.vsa.fold(_wide(programs, self.items)[..., None, :], self.items) if self.vsa.bilinear else None
-        self.register_buffer("folded", folded, persistent=False)
+        if lengths is None:
+            items, _ = in_units(items)
+            lengths = norms(items)
+        self.vsa = vsa
+        folded = vsa.fold(_wide(programs, items)[..., None, :], items) if vsa.bilinear else None
+        buffers = {"programs": programs, "units": units, "items": items, "lengths": lengths, "folded": folded}
+        for name, tensor in buffers.items():
+            self.register_buffer(name, tensor, persistent=False)
 
     def of(self, programs: Shaped[Tensor, "*b d"]) -> "Readout":
-        """A readout of other programs with the same items."""
-        other = Readout.__new__(Readout)
-        nn.Module.__init__(other)
-        other.vsa = self.vsa
-        other.register_buffer("items", self.items, persistent=False)
-        other.register_buffer("lengths", self.lengths, persistent=False)
-        other._read(programs)
-        return other
+        """A readout of other programs with the same items, whose lengths are known already."""
+        return Readout(self.vsa, programs, self.items, self.lengths)
 
     def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
         """The score of each item for each condition."""
