@@ -30,7 +30,9 @@ Layout = Mapping[str, tuple[torch.dtype, tuple[int, ...]]]
 
 def save_tensors(path: str | Path, kind: str, tensors: Mapping[str, Tensor], about: Mapping[str, Any]) -> Path:
     """Write tensors and a JSON-able description of the given kind ("bank", "demonstrations") to one file."""
-    flat = {name: tensor.detach().cpu().clone(memory_format=torch.contiguous_format) for name, tensor in tensors.items()}
+    flat = {
+        name: tensor.detach().cpu().clone(memory_format=torch.contiguous_format) for name, tensor in tensors.items()
+    }
     head = {"kind": kind, "format": FORMAT, "about": about}
     # One metadata entry: safetensors writes several of them in any order.
     text = json.dumps(head | {"checksum": checksum(head, flat)})

@@ -1,0 +1,1 @@
+"""Fast paths, each beside the plain line that it equals and with the command that measured it."""

@@ -1,0 +1,226 @@
+"""Encoders and protections for one row at a time, in NumPy: what a robot needs at every control tick.
+
+A single row takes PyTorch a hundred small steps of some microseconds; NumPy's take a tenth of that. The plain line is
+`protection(encoder(x))`; integers are equal in every bit, floats but for rounding. Measured by
+`python -m benchmarks --only recall`.
+
+Parts are looked up by their very class: what derives from one of them may do something else, and takes the plain line.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from torchvsa.architectures import BSC, FHRR, HRR, MAP, VSA
+from torchvsa.encoders import Encoder, Product, SubsetProduct, Sum, ThresholdFeatures
+from torchvsa.encoders.base import Binned
+from torchvsa.protection import FixedShift, Protection, SelfShift, Unprotected
+
+Array = NDArray[Any]
+Row = Callable[[Array], Array]
+ROUNDED = 1 + 2.0**-50
+"""See `binned`."""
+
+
+class Verbs(NamedTuple):
+    """The verbs of an architecture on rows `[k, d]`."""
+
+    bind: Row
+    bundle: Row
+    noise: Callable[[Array], Callable[[Array, Array], float]] | None = None
+    """For a program, what finds `|unbind(program, key)|²` of a key and its squares (see `real`).
+
+    None where that is a product of squares, as wherever `bind` acts element by element.
+    """
+
+
+def row_encoder(encoder: Encoder, protection: Protection) -> Row | None:
+    """`protection(encoder(x))` for a row of readings `[n]` in [0, 1], of which one at least is no NaN.
+
+    None for parts that have no such form, and on other devices than the CPU.
+    """
+    known = verbs(encoder.vsa)
+    if known is None or type(encoder) not in _ENCODERS or type(protection) not in _PROTECTIONS:
+        return None
+    if any(tensor.device.type != "cpu" for tensor in (*encoder.buffers(), *protection.buffers())):
+        return None
+    encode = _ENCODERS[type(encoder)](encoder, known)
+    protect = _PROTECTIONS[type(protection)](protection, known)
+    return None if encode is None else lambda x: protect(encode(x))
+
+
+def real(code: Array) -> Array:
+    """A hypervector in float64 with the same products: bits as votes, complex elements as pairs."""
+    if code.dtype == np.bool_:
+        return 1.0 - 2.0 * code
+    return (code.view(np.real(code).dtype) if np.iscomplexobj(code) else code).astype(np.float64)
+
+
+# -- architectures --------------------------------------------------------------------------------------
+
+
+def verbs(vsa: VSA) -> Verbs | None:
+    """The verbs of an architecture, None if there are none for it."""
+    return _VERBS[type(vsa)](vsa) if type(vsa) in _VERBS else None
+
+
+def noise(vsa: VSA, program: Array) -> Callable[[Array, Array], float]:
+    """What finds `|unbind(program, key)|²` of a key, as `real` has it, and its squares."""
+    known = verbs(vsa)
+    if known is not None and known.noise is not None:
+        return known.noise(program)
+    squares = np.abs(program if program.dtype != np.bool_ else 1).astype(np.float64) ** 2
+    weights = np.broadcast_to(squares, vsa.dim).repeat(2 if np.iscomplexobj(program) else 1)
+    return lambda _, squares: float(squares @ weights)
+
+
+def _product(rows: Array) -> Array:
+    return np.multiply.reduce(rows, 0, dtype=rows.dtype)
+
+
+def _sum(rows: Array) -> Array:
+    # Integer codes are -1, 0 and +1.
+    return np.add.reduce(rows, 0, dtype=np.int32 if rows.dtype == np.int8 and len(rows) > 127 else rows.dtype)
+
+
+def _map(vsa: Any) -> Verbs:
+    def clipped(rows: Array) -> Array:
+        total = _sum(rows)
+        # The sign of a whole number is what clipping leaves of it, and found far faster.
+        return np.sign(total).astype(rows.dtype, copy=False) if vsa.integer else total.clip(-1, 1)
+
+    def majority(rows: Array) -> Array:
+        total = np.sign(_sum(rows))
+        return np.where(total == 0, _rolled(rows[0] * rows[min(1, len(rows) - 1)], 1), total).astype(rows.dtype)
+
+    def summed(rows: Array) -> Array:
+        return np.add.reduce(rows, 0, dtype=np.int32 if vsa.integer else rows.dtype)
+
+    return Verbs(_product, {"C": clipped, "I": summed, "B": majority}[vsa.variant])
+
+
+def _bsc(_: VSA) -> Verbs:
+    def majority(rows: Array) -> Array:
+        ones = 2 * np.add.reduce(rows, 0, dtype=np.int32)
+        return np.where(ones == len(rows), _rolled(rows[0] ^ rows[min(1, len(rows) - 1)], 1), ones > len(rows))
+
+    return Verbs(lambda rows: np.logical_xor.reduce(rows, 0), majority)
+
+
+def _fhrr(_: VSA) -> Verbs:
+    def unit(rows: Array) -> Array:
+        raw = _sum(rows)
+        size = np.abs(raw)
+        return np.divide(raw, size, out=np.zeros_like(raw), where=size > 0)
+
+    return Verbs(_product, unit)
+
+
+def _hrr(vsa: VSA) -> Verbs:
+    def convolved(rows: Array) -> Array:
+        return np.fft.irfft(_product(np.fft.rfft(rows)), vsa.dim).astype(rows.dtype)
+
+    def unit(rows: Array) -> Array:
+        raw = _sum(rows)
+        return raw / (np.linalg.norm(raw) or 1)
+
+    def noise(program: Array) -> Callable[[Array, Array], float]:
+        # By Parseval's theorem; but for the ends, each frequency of a real vector stands for two.
+        power = np.abs(np.fft.rfft(program)) ** 2 * 2 / vsa.dim
+        power[0] /= 2
+        if vsa.dim % 2 == 0:
+            power[-1] /= 2
+        return lambda key, _: float(power @ np.abs(np.fft.rfft(key)) ** 2)
+
+    return Verbs(convolved, unit, noise)
+
+
+_VERBS: dict[type, Callable[[Any], Verbs]] = {MAP: _map, BSC: _bsc, FHRR: _fhrr, HRR: _hrr}
+
+# -- encoders -------------------------------------------------------------------------------------------
+
+
+def _record(encoder: Any, join: Row) -> Row | None:
+    values = list(encoder.values) * (encoder.sensors if encoder.shared else 1)
+    if encoder.table is None or any(type(value).cells is not Binned.cells for value in values):
+        return None
+    table, sensors = encoder.table.numpy(), np.arange(encoder.sensors)
+    bins = np.array([value.bins for value in values], dtype=np.float64)
+    scale, last = bins * ROUNDED, bins - 1
+
+    def encode(x: Array) -> Array:
+        cells, observed = np.minimum(np.floor(x * scale), last), ~np.isnan(x)
+        if observed.all():
+            return join(table[sensors, cells.astype(np.int64)])
+        return join(table[sensors[observed], cells[observed].astype(np.int64)])
+
+    return encode
+
+
+def _thresholds(encoder: Any, _: Verbs) -> Row | None:
+    vsa, bins = encoder.vsa, encoder.bins
+    start, negative = encoder.start_codes.numpy(), vsa.negative(encoder.start_codes).resolve_neg().numpy()
+    # Small numbers are compared several at once.
+    sensor, threshold, above = encoder.sensor.numpy(), encoder.threshold.int().numpy(), encoder.above.numpy()
+    questions = list(zip(sensor, threshold, above, strict=True))
+    edges = encoder.edges.numpy() if hasattr(encoder, "edges") else None
+
+    def encode(x: Array) -> Array:
+        found = np.minimum(np.floor(x * (bins * ROUNDED)), bins - 1) if edges is None else (edges <= x[:, None]).sum(1)
+        unseen = np.isnan(x)
+        missing = bool(unseen.any())
+        cells = (np.where(unseen, -1, found) if missing else found).astype(np.int32)
+        against, blind = np.zeros(vsa.dim, np.bool_), missing
+        for sensor, threshold, above in questions:
+            asked = cells.take(sensor)
+            apart = (asked > threshold) != above
+            if missing:
+                apart &= asked >= 0
+                blind = blind & (asked < 0)
+            against |= apart
+        return np.where(against | blind if missing else against, start, negative)
+
+    return encode
+
+
+_ENCODERS: dict[type, Callable[[Any, Verbs], Row | None]] = {
+    Sum: lambda encoder, known: _record(encoder, known.bundle),
+    Product: lambda encoder, known: _record(encoder, known.bind),
+    SubsetProduct: lambda encoder, known: _record(encoder, known.bind),
+    ThresholdFeatures: _thresholds,
+}
+
+# -- protections ----------------------------------------------------------------------------------------
+
+
+def _rolled(x: Array, shift: int) -> Array:
+    return np.concatenate((x[-shift:], x[:-shift])) if shift else x
+
+
+def _fixed(protection: Any, _: Verbs) -> Row:
+    shift = protection.shift % protection.vsa.dim
+    return lambda x: _rolled(x, shift)
+
+
+def _self_shift(protection: Any, known: Verbs) -> Row:
+    bundle, dim, name = known.bundle, protection.vsa.dim, protection.h.numpy()
+
+    def protect(x: Array) -> Array:
+        pair = np.empty((2, dim), x.dtype)
+        pair[1] = name
+        places = np.flatnonzero(~x if x.dtype == np.bool_ else np.real(x) > 0)
+        count, total = len(places), int(places.sum())
+        width = total % dim if protection.width_rule == "sum" else (2 * total + count) // max(2 * count, 1)
+        pair[0] = x
+        return _rolled(bundle(pair), width)
+
+    return protect
+
+
+_PROTECTIONS: dict[type, Callable[[Any, Verbs], Row]] = {
+    Unprotected: lambda _, __: lambda x: x,
+    FixedShift: _fixed,
+    SelfShift: _self_shift,
+}
