@@ -81,6 +81,7 @@ class ThresholdFeatures(Encoder):
         self.vsa, self.sensors, self.bins = vsa, whole("sensors", sensors), whole("bins", bins)
         self.subset = None if subset is None else whole("subset", subset)
         self.kinds = _kinds(kinds, self.sensors, self.bins)
+        self._most_categories = max([0, *(kind for kind in self.kinds or () if isinstance(kind, int))])
         if self.kinds is not None:
             # They follow from the kinds, so that no file holds them.
             sizes = [self.bins if isinstance(kind, str) else kind for kind in self.kinds]
@@ -100,10 +101,6 @@ class ThresholdFeatures(Encoder):
     @property
     def _most(self) -> int:
         return min(self.subset or self.sensors, self.sensors)
-
-    @property
-    def _most_categories(self) -> int:
-        return max((kind for kind in self.kinds or () if isinstance(kind, int)), default=0)
 
     def own_layout(self) -> Layout:
         """`start_codes` `[d]`; `sensor`, `threshold` and `above` `[subset, d]`; where needed `members` and `edges`.
@@ -182,13 +179,15 @@ class ThresholdFeatures(Encoder):
             return side
         sensor = self.sensor[place]
         # A half circle that does not hold the end of the range; the others are its opposites.
-        ends = threshold + self.bins // 2
-        side = side & ~(self.angle[sensor][:, None] & (cells > ends[:, None]))
+        reach = torch.where(self.angle, self.bins // 2, self.bins).index_select(0, sensor)
+        side = side & (cells <= (threshold + reach)[:, None])
         if not self._most_categories:
             return side
         # Cells of other kinds are looked up in vain.
         chosen = self.members[place].gather(1, cells.clamp(0, self._most_categories - 1))
-        return torch.where(self.category[sensor][:, None], chosen, side)
+        category = self.category.index_select(0, sensor)[:, None]
+        # Not `torch.where`, which onnxruntime does not know for booleans.
+        return (chosen & category) | (side & ~category)
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
         vsa, most, categories = self.vsa, self._most, self._most_categories

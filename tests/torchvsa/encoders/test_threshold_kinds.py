@@ -85,7 +85,8 @@ def test_one_dimension_in_sixteen_is_constant_for_every_kind() -> None:
 
 def test_real_kinds_change_no_bit() -> None:
     vsa = torchvsa.MAP(300)
-    plain, said = ThresholdFeatures(vsa, 3, 9, 2, seed=0), ThresholdFeatures(vsa, 3, 9, 2, seed=0, kinds=["real"] * 3)
+    plain = ThresholdFeatures(vsa, 3, 9, 2, seed=0)
+    said = ThresholdFeatures(vsa, 3, 9, 2, seed=0, kinds=["real", "real", "real"])
     assert said.config() == plain.config()
     assert "kinds" not in plain.config()
     assert said.state_dict().keys() == plain.state_dict().keys()
