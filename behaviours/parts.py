@@ -140,7 +140,7 @@ class Sensor:
 
     def _checked_values(self) -> tuple[str, ...] | tuple[float, ...]:
         given, who = self.values, f"sensor {self.name!r}"
-        if isinstance(given, str) or not hasattr(given, "__iter__"):
+        if isinstance(given, str) or not hasattr(given, "__iter__") or getattr(given, "ndim", 1) != 1:
             raise ValueError(f"{who}: values are a sequence such as ('low', 'high'); got {given!r:.200}")
         values = tuple(given)
         if self.kind != "categorical":

@@ -155,6 +155,7 @@ SENSELESS: list[tuple[str, dict[str, Any]]] = [
     ("'x' is categorical and needs at least two values; got ['a']", {"values": ["a"]}),
     ("'x': values are a sequence such as ('low', 'high'); got 'ab'", {"values": "ab"}),
     ("'x': values are a sequence such as ('low', 'high'); got 3", {"values": 3}),
+    ("'x': values are a sequence such as ('low', 'high'); got tensor(3)", {"values": torch.tensor(3)}),
     ("'x': values are all text, or all real numbers; got ['a', 1]", {"values": ("a", 1)}),
     ("'x': values are all text, or all real numbers; got [True, False]", {"values": (True, False)}),
     ("'x': values are all text, or all real numbers; got [None, 1]", {"values": (None, 1)}),
