@@ -4,13 +4,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
 from behaviours.schema import Schema
 from behaviours.storage import load_tensors, save_tensors
-from behaviours.tables import checked_names, column_names, compare_names, mask, numbers, whole_numbers
+from behaviours.tables import ReadText, checked_names, column_names, compare_names, mask, numbers, whole_numbers
 from torchvsa import ShapeError
 
 
@@ -19,6 +20,9 @@ class Demonstrations:
 
     Takes tensors, arrays, lists, or data frames (a series is one column), and copies them. `episodes` `[N]` says which
     run each row comes from (all from run 0, if left out). NaN readings were not observed.
+
+    With a `schema`, readings of categorical sensors may be text, which is kept as its index among their values (see
+    `Schema.numeric`), and everything is compared with the schema at once; without, learning does so.
 
     `sensor_names` and `actuator_names`, tuples or None, are the names of the columns: those of the data frames, unless
     given. Where there are any, learning compares them with those of the schema.
@@ -35,8 +39,14 @@ class Demonstrations:
         *,
         sensor_names: Sequence[str] | None = None,
         actuator_names: Sequence[str] | None = None,
+        schema: Schema | None = None,
     ) -> None:
-        self.sensors: Float64[Tensor, "N n"] = _table(sensors, "sensors")
+        given = sensors
+        if schema is not None:
+            # A series is one column.
+            single = getattr(sensors, "ndim", None) == 1 and hasattr(sensors, "to_frame")
+            given = schema.numeric(sensors.to_frame() if single else sensors)
+        self.sensors: Float64[Tensor, "N n"] = _table(given, "sensors", _refuse_text)
         self.commands: Float64[Tensor, "N m"] = _table(commands, "commands")
         count = len(self.sensors)
         if count == 0:
@@ -57,6 +67,8 @@ class Demonstrations:
             raise ValueError(f"commands has {self.commands[row, column].item()} in row {row}, column {column}")
         self.sensor_names = _names(sensors, self.sensors, sensor_names, "sensor_names")
         self.actuator_names = _names(commands, self.commands, actuator_names, "actuator_names")
+        if schema is not None:
+            self.check(schema)
 
     def __len__(self) -> int:
         return len(self.sensors)
@@ -81,7 +93,8 @@ class Demonstrations:
         """The rows for which `keep` `[N]`, one boolean per row, is true. Raises `ValueError` for anything else."""
         # Readings and episodes may be on different devices; an index from the CPU suits both.
         chosen = mask(keep, len(self), "keep").cpu()
-        return Demonstrations(self.sensors[chosen], self.commands[chosen], self.episodes[chosen], **self._names())
+        rows = self.sensors[chosen], self.commands[chosen], self.episodes[chosen]
+        return Demonstrations(*rows, sensor_names=self.sensor_names, actuator_names=self.actuator_names)
 
     @staticmethod
     def join(parts: Iterable["Demonstrations"]) -> "Demonstrations":
@@ -104,7 +117,7 @@ class Demonstrations:
                     "joined parts have the same names in the same order, or none"
                 )
         joined = (torch.cat([getattr(part, field) for part in parts]) for field in ("sensors", "commands", "episodes"))
-        return Demonstrations(*joined, **first._names())
+        return Demonstrations(*joined, sensor_names=first.sensor_names, actuator_names=first.actuator_names)
 
     def save(self, path: str | Path) -> Path:
         """Write to one safetensors file, whole or not at all."""
@@ -131,9 +144,20 @@ _TYPES = {"sensors": torch.float64, "commands": torch.float64, "episodes": torch
 _NAMES = ("sensor_names", "actuator_names")
 
 
-def _table(values: Any, name: str) -> Float64[Tensor, "N columns"]:
+def _refuse_text(table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    for place, value in np.ndenumerate(table):
+        if isinstance(value, str):
+            row = f" in row {place[0]}" if place else ""
+            raise ValueError(
+                f"sensors must be real numbers; got the text {str(value)!r:.80}{row} (with schema=, the text of "
+                "categorical sensors is read)"
+            )
+    return table
+
+
+def _table(values: Any, name: str, read_text: ReadText | None = None) -> Float64[Tensor, "N columns"]:
     """A copy of a table, in which a series is one column."""
-    rows = numbers(values, name).detach()
+    rows = numbers(values, name, read_text).detach()
     if rows.dim() == 1 and hasattr(values, "to_numpy"):
         rows = rows[:, None]
     if rows.dim() != 2 or rows.shape[1] == 0:

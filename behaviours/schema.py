@@ -1,4 +1,4 @@
-"""What a robot senses and does: names, ranges and units."""
+"""What a robot senses and does: names, ranges, kinds and units."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -9,8 +9,9 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from behaviours.kinds import allowed, placed, settled
 from behaviours.parts import Actuator, Sensor, most_parts
-from behaviours.tables import column_names, compare_names, numbers
+from behaviours.tables import ReadText, column_names, compare_names, numbers
 from torchvsa import ShapeError
 
 
@@ -19,7 +20,7 @@ class Schema:
     """The sensors and actuators of a robot, in the order of the columns of its data.
 
     Readings and commands are rows of numbers: tensors, arrays, lists, or a DataFrame, whose names of columns must be
-    those of the schema in the same order.
+    those of the schema in the same order. Readings of categorical sensors may be text, see `Sensor`.
     """
 
     sensors: Sequence[Sensor]
@@ -48,8 +49,14 @@ class Schema:
             compare_names(actuators, [actuator.name for actuator in self.actuators], "commands")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, for a file."""
-        return asdict(self)
+        """Plain values, for a file; the kinds and values of sensors only where they differ from the default."""
+        data = asdict(self)
+        for sensor in data["sensors"]:
+            if sensor["kind"] == "real":
+                del sensor["kind"]
+            if not sensor["values"]:
+                del sensor["values"]
+        return data
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> "Schema":
@@ -57,54 +64,90 @@ class Schema:
         return cls([Sensor(**s) for s in data["sensors"]], [Actuator(**a) for a in data["actuators"]])
 
     def normalise(self, readings: Any) -> Float64[Tensor, "batch n"]:
-        """Readings in units of their sensors' ranges, within [0, 1]; NaN (not observed) stays NaN.
+        """Readings as numbers in [0, 1], which encoders take; NaN (not observed) stays NaN.
 
-        Raises an error that names sensor, row and range for infinite readings and those out of range. In a compiled or
-        exported graph no value can raise: there all readings, infinite ones too, are clipped.
+        A real reading is in units of its range, an angle a share of a full turn in [0, 1), a binary reading 0 or 1. The
+        i-th of c categories is (i + 0.5) / c, the middle of the i-th of c bins, so that an encoder with c bins has
+        exactly one for each.
+
+        Raises an error that names sensor, row and what is allowed for anything else. In a compiled or exported graph no
+        value can raise: there all readings, infinite ones too, are clipped, categories are the nearest one, and an
+        infinite angle is one that was not observed.
         """
         rows, low, high = self._checked(readings)
-        return (rows - low) / (high - low)
+        return (rows - low) / (high - low) if self._all_real else placed(self.sensors, rows)
 
     def check_bins(self, bins: int) -> None:
         """Raise `ValueError` for a sensor whose range cannot be parted into so many bins of equal width."""
         for sensor in self.sensors:
-            if bins > most_parts(sensor.low, sensor.high):
+            if not sensor.choices and bins > most_parts(sensor.low, sensor.high):
                 raise ValueError(
                     f"sensor {sensor.name!r}: {bins} bins of the range [{sensor.low}, {sensor.high}] cannot be told "
                     "apart in float64; take fewer, or a range of another width or nearer to 0"
                 )
 
-    def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
-        """Readings as float64 rows, clipped where a sensor says so; raises if any is not valid.
+    def numeric(self, readings: Any) -> Float64[Tensor, "batch n"]:
+        """Readings as float64 rows, with the indices of text; raises for unknown text, but looks at no numbers."""
+        names = [sensor.name for sensor in self.sensors]
+        labels = any(sensor.labels for sensor in self.sensors)
+        return _rows(readings, len(names), "sensor readings", names, self._without_text if labels else None)
 
-        In a compiled or exported graph no value can raise: there all readings, infinite ones too, are clipped.
+    def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
+        """Readings as float64 rows, clipped where a sensor says so, angles within their range; raises if any is wrong.
+
+        Text becomes its index, see `numeric`.
         """
         return self._checked(readings)[0]
 
     def _checked(self, readings: Any) -> tuple[Tensor, Tensor, Tensor]:
         """See `check_readings`; the least and the greatest value of each sensor too."""
-        rows = _rows(readings, len(self.sensors), "sensor readings", [s.name for s in self.sensors])
+        rows = self.numeric(readings)
         low, high = self._bounds(self.sensors, rows.device)
         if not torch.compiler.is_compiling():
             inside = (rows >= low) & (rows <= high)
-            if inside.all():
+            valid = inside if self._all_real else allowed(self.sensors, rows, inside)
+            if (inside & valid).all():
                 return rows, low, high
-            self._refuse(rows, ~inside & ~rows.isnan())
-        return torch.minimum(torch.maximum(rows, low), high), low, high
+            self._refuse(rows, ~valid & ~rows.isnan())
+        if self._all_real:
+            return torch.minimum(torch.maximum(rows, low), high), low, high
+        return settled(self.sensors, rows, low, high), low, high
 
-    def _refuse(self, rows: Tensor, outside: Tensor) -> None:
-        """Raise if a reading is infinite, or `outside` a range and its sensor does not clip."""
+    @property
+    def _all_real(self) -> bool:
+        return all(sensor.kind == "real" for sensor in self.sensors)
+
+    def _refuse(self, rows: Tensor, wrong: Tensor) -> None:
+        """Raise if a reading is infinite, or `wrong` and its sensor does not clip."""
         strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
-        wrong = rows.isinf() | (outside & strict)
+        wrong = rows.isinf() | (wrong & strict)
         if wrong.any():
             row, column = wrong.nonzero()[0].tolist()
             sensor = self.sensors[column]
             value = rows[row, column].item()
+            clips = sensor.kind == "real" and not np.isinf(value)
             raise ValueError(
-                f"sensor {sensor.name!r} reads {value:g} in row {row}; its range is [{sensor.low:g}, {sensor.high:g}]"
-                f"{' ' + sensor.unit if sensor.unit else ''}"
-                + ("" if np.isinf(value) else " (declare it with beyond='clip' to accept the nearest bound)")
+                f"sensor {sensor.name!r} reads {value:g} in row {row}; {sensor.described()}"
+                + (" (declare it with beyond='clip' to accept the nearest bound)" if clips else "")
             )
+
+    def _without_text(self, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+        """A copy of a table of objects in which the text of categorical sensors is its index."""
+        names = [sensor.name for sensor in self.sensors]
+        _check_shape(table.shape, len(names), "sensor readings", names)
+        table = table.copy()
+        for column, sensor in zip(table.T, self.sensors, strict=True):
+            labels = sensor.labels
+            for row, value in enumerate(column):
+                if not isinstance(value, str):
+                    continue
+                if value not in labels:
+                    raise ValueError(
+                        f"sensor {sensor.name!r} reads the text {str(value)!r:.80} in row {row}; {sensor.described()}"
+                        + ("" if labels else " (rows of numbers and text are lists, arrays of objects or data frames)")
+                    )
+                column[row] = labels[value]
+        return table
 
     def command_levels(self, commands: Any) -> Int64[Tensor, "batch m"]:
         """The nearest level of each command (halves up). Raises, naming actuator and row, if one is not in range."""
@@ -133,15 +176,24 @@ class Schema:
         return ranges[:, 0], ranges[:, 1]
 
 
-def _rows(values: Any, columns: int, what: str, names: list[str]) -> Float64[Tensor, "batch columns"]:
-    rows = numbers(values, what)
-    if rows.dim() != 2 or rows.shape[1] != columns:
-        hint = "; write one row as a batch of one, [row]" if rows.dim() == 1 and len(rows) == columns else ""
-        raise ShapeError(
-            f"{what} must be rows of {columns} values ({', '.join(names)}), shape [batch, {columns}]; "
-            f"got shape {tuple(rows.shape)}{hint}"
-        )
+def _rows(
+    values: Any, columns: int, what: str, names: list[str], read_text: ReadText | None = None
+) -> Float64[Tensor, "batch columns"]:
     given = column_names(values)
+    if read_text is not None and given is not None and len(given) == columns:
+        # Before text is looked for in columns that may be other ones.
+        compare_names(given, names, what)
+    rows = numbers(values, what, read_text)
+    _check_shape(rows.shape, columns, what, names)
     if given is not None:
         compare_names(given, names, what)
     return rows
+
+
+def _check_shape(shape: Sequence[int], columns: int, what: str, names: list[str]) -> None:
+    if len(shape) != 2 or shape[1] != columns:
+        hint = "; write one row as a batch of one, [row]" if tuple(shape) == (columns,) else ""
+        raise ShapeError(
+            f"{what} must be rows of {columns} values ({', '.join(names)}), shape [batch, {columns}]; "
+            f"got shape {tuple(shape)}{hint}"
+        )

@@ -11,22 +11,25 @@ from torch import Tensor, nn
 import torchvsa
 from behaviours.schema import Schema
 from behaviours.storage import Layout, check_layout, naming
+from behaviours.suiting import check_told_apart, check_value_bins, default_encoder
 from torchvsa import MAP, VSA, Part, Protection, Unprotected
 from torchvsa._checks import whole_number
-from torchvsa.encoders import Balanced, Encoder, Record, Sum, ThresholdFeatures, ValueEncoder
+from torchvsa.encoders import Balanced, Encoder, Sum, ValueEncoder
 
 
 class Space(nn.Module):
     """Encode readings as conditions and commands as results, with one set of random codebooks.
 
     Give an `encoder` (which holds its architecture), or a `vsa` on which the default encoder is made, or neither. By
-    default conditions are 4,000 integers that each ask about one or two sensors (`ThresholdFeatures`), unprotected,
-    and the levels of the actuators have `Balanced` codes: what did best on robots for which nothing was tuned.
+    default conditions are 4,000 integers that each ask one or two sensors a question that suits their kinds
+    (`ThresholdFeatures`), unprotected, and the levels of the actuators have `Balanced` codes: what did best on robots
+    for which nothing was tuned.
     `command_codes` encodes the levels of the actuators. Parts that are plans, without codebooks of their own, are
     copied and drawn from `seed`: encoder first, then the codes of commands, then the protection. The same seed draws
     the same codebooks.
 
-    Raises `ValueError` for parts of different architectures or numbers of sensors.
+    Raises `ValueError` for parts of different architectures or numbers of sensors, and for an encoder that cannot tell
+    the values of a categorical or binary sensor apart.
     """
 
     def __init__(
@@ -45,14 +48,12 @@ class Space(nn.Module):
         _check_kinds(encoder, vsa, protection, command_codes)
         sensors, actuators = len(schema.sensors), schema.actuators
         if encoder is None:
-            vsa = vsa or MAP(dim=4000, dtype=torch.int8)
-            encoder = ThresholdFeatures(vsa, sensors, bins=256, subset=2)
+            encoder = default_encoder(schema, vsa or MAP(dim=4000, dtype=torch.int8))
         elif vsa is not None and vsa != encoder.vsa:
             raise ValueError(f"the encoder works on {encoder.vsa}, which is not the given {vsa}; give one of them")
         if encoder.sensors != sensors:
             raise ValueError(f"the encoder is for {encoder.sensors} sensors; the schema has {sensors}")
-        if isinstance(encoder, Record) and encoder.discrete:
-            schema.check_bins(encoder.bins)
+        check_value_bins(schema, encoder)
         self.vsa = encoder.vsa
         most = max(actuator.levels for actuator in actuators)
         results = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
@@ -61,6 +62,7 @@ class Space(nn.Module):
         protection = protection or Unprotected(self.vsa)
         generator = torch.Generator().manual_seed(self.seed)
         self.encoder = _drawn(encoder, self.vsa, generator)
+        check_told_apart(schema, self.encoder)
         self.results = _drawn(results, self.vsa, generator)
         self.protect = _drawn(protection, self.vsa, generator)
 

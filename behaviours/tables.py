@@ -1,6 +1,7 @@
 """Tables of numbers as they are given: tensors, arrays, lists, and data frames with names of columns."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from numbers import Real
 from typing import Any
 
@@ -9,18 +10,22 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+ReadText = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
+"""Puts numbers in the place of text, in a table of objects."""
 
-def numbers(values: Any, what: str) -> Float64[Tensor, "..."]:
+
+def numbers(values: Any, what: str, read_text: ReadText | None = None) -> Float64[Tensor, "..."]:
     """`values` as a float64 tensor; a tensor of that type as it is, anything else copied.
 
-    Takes what NumPy takes, and whatever has `to_numpy`, such as a DataFrame. Booleans count as 0 and 1. Raises
-    `ValueError`, which begins with `what`, for complex numbers, text, None, and rows of unequal length.
+    Takes what NumPy takes, and whatever has `to_numpy`, such as a DataFrame. Booleans count as 0 and 1. `read_text` is
+    given tables with text, or of objects, first. Raises `ValueError`, which begins with `what`, for complex numbers,
+    other text, None, and rows of unequal length.
     """
     if isinstance(values, Tensor):
         if values.is_complex():
             raise ValueError(f"{what} must be real numbers; got {_dtype(values)}")
         return values.to(torch.float64)
-    array = _array(values, what)
+    array = _array(values, what, read_text)
     if array.dtype.kind not in "biuf":
         raise ValueError(f"{what} must be real numbers; got {_described(array)}")
     return torch.from_numpy(np.array(array, dtype=np.float64, order="C"))
@@ -89,16 +94,30 @@ def compare_names(given: Sequence[str], expected: Sequence[str], what: str, whos
     )
 
 
-def _array(values: Any, what: str) -> np.ndarray[Any, Any]:
+def _array(values: Any, what: str, read_text: ReadText | None = None) -> np.ndarray[Any, Any]:
     """`values` as NumPy reads them, with objects that are all numbers as floats."""
-    try:
+    with _readable(what):
         if isinstance(values, np.ndarray):
             array = values
         elif hasattr(values, "to_numpy"):
             array = _frame_values(values)
         else:
             array = np.array(values)
+    if read_text is not None and array.dtype.kind in "OU":
+        with _readable(what):
+            # In lists with text NumPy turns numbers into text too, but not among objects.
+            array = array if isinstance(values, np.ndarray) or array.dtype == object else np.array(values, dtype=object)
+            array = np.ma.filled(array.astype(object), np.nan)
+        array = read_text(array)
+    with _readable(what):
         return _plain(array, what)
+
+
+@contextmanager
+def _readable(what: str) -> Iterator[None]:
+    """Turn whatever NumPy raises into a `ValueError` that begins with `what`."""
+    try:
+        yield
     except (TypeError, OverflowError, RuntimeError) as error:
         raise ValueError(f"{what} cannot be read as numbers: {error}") from error
     except ValueError as error:

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-FIRST, PAPER, CLASSIFIER = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+FIRST, KINDS, PAPER, CLASSIFIER = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def run(code: str) -> str:
@@ -25,6 +25,10 @@ def test_the_first_lines_are_few_run_and_answer() -> None:
     code = FIRST + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
     code += "assert 'program' in steer.state_dict() and steer.program.shape == (4000,)\n"
     assert "program" in run(code)
+
+
+def test_a_robot_with_sensors_of_all_kinds_drives_across_the_seam() -> None:
+    assert float(run(KINDS)) == 1
 
 
 def test_the_parts_of_the_paper_are_made() -> None:

@@ -147,13 +147,20 @@ class Binned(ValueEncoder):
         return {"codes": self._codes(generator)}
 
 
-def binned(x: Float[Tensor, "*batch"], bins: int) -> Int64[Tensor, "*batch"]:
+def binned(x: Float[Tensor, "*batch"], bins: int | Int64[Tensor, "n"]) -> Int64[Tensor, "*batch"]:
     """The bin of each value among `bins` of equal width over [0, 1], -1 for NaN.
+
+    `bins` may be a tensor with a number for each column, the last dimension of `x`.
 
     A value that is an edge but for rounding in its type (7 of a range of 25, in 25 bins) is in the bin above the edge.
     """
     rounding = max(_ROUNDING, torch.finfo(x.dtype).eps)
-    index = (x.to(torch.float64) * (bins * (1 + rounding))).floor().clamp(0, bins - 1)
+    if isinstance(bins, Tensor):
+        # Not as integers times a float, whose product is of the default type.
+        index = (x.to(torch.float64) * (bins.to(torch.float64) * (1 + rounding))).floor()
+        index = index.clamp(min=0).minimum(bins.to(torch.float64) - 1)
+    else:
+        index = (x.to(torch.float64) * (bins * (1 + rounding))).floor().clamp(0, bins - 1)
     return torch.where(x.isnan(), float(UNOBSERVED), index).to(torch.int64)
 
 

@@ -1,12 +1,13 @@
 """A few thresholds per dimension: conditions whose elements each ask about a few sensors."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import torch
-from jaxtyping import Float, Float64, Int64, Shaped
+from jaxtyping import Bool, Float, Float64, Int64, Shaped
 from torch import Tensor
 
+from torchvsa._checks import whole_number
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
 from torchvsa.encoders.base import Encoder, binned, whole
@@ -14,6 +15,10 @@ from torchvsa.part import Layout
 
 _CONSTANT = 1 / 16
 """The share of dimensions that ask nothing: few, and enough to carry a constant answer."""
+_MOST_CATEGORIES = 2**20
+"""The positions (i + 0.5) / c of so many categories are distinct in float32 too."""
+Kind = Literal["real", "angle"] | int
+"""What a sensor is asked; see `ThresholdFeatures`."""
 
 
 class ThresholdFeatures(Encoder):
@@ -34,6 +39,19 @@ class ThresholdFeatures(Encoder):
     thresholds of a sensor are spread evenly over its bins, so that few dimensions serve it well. Needs an architecture
     that can negate.
 
+    `kinds`, one per sensor, says what each of them is asked; all are "real", if left out. The kernels are those of one
+    sensor alone, but for the dimensions that ask nothing.
+
+    | kind | the question | kernel |
+    |---|---|---|
+    | `"real"` | Is the reading above a threshold? | 1 - 2·|difference| |
+    | `"angle"` | Is it in the half circle that begins at an angle? | 1 - 4·δ, with δ the distance in turns |
+    | a number c | Is it in a random half of c categories? | 1 for the same, else -1 / (c - 1), or -1 / c for odd c |
+
+    For an angle 0 and 1 are the same, and there must be an even number of bins. Category i of c is at (i + 0.5) / c, or
+    anywhere from i / c to (i + 1) / c. Neither has edges. Categories take another subset · d · c booleans, for the
+    largest c.
+
     Source: thermometer codes, Kleyko et al. 2018; random features of boxes, as in random forests (Breiman 2001),
     without their labels.
     """
@@ -43,7 +61,11 @@ class ThresholdFeatures(Encoder):
     sensor: Tensor
     threshold: Tensor
     above: Tensor
+    members: Tensor
     edges: Tensor
+    sizes: Tensor
+    angle: Tensor
+    category: Tensor
 
     def __init__(
         self,
@@ -53,12 +75,22 @@ class ThresholdFeatures(Encoder):
         subset: int | None = None,
         edges: int | Sequence[Float[Tensor, "_"]] | None = None,
         seed: int | None = None,
+        kinds: Sequence[Kind] | None = None,
     ) -> None:
         super().__init__()
         self.vsa, self.sensors, self.bins = vsa, whole("sensors", sensors), whole("bins", bins)
         self.subset = None if subset is None else whole("subset", subset)
+        self.kinds = _kinds(kinds, self.sensors, self.bins)
+        self._most_categories = max([0, *(kind for kind in self.kinds or () if isinstance(kind, int))])
+        if self.kinds is not None:
+            # They follow from the kinds, so that no file holds them.
+            sizes = [self.bins if isinstance(kind, str) else kind for kind in self.kinds]
+            self.register_buffer("sizes", torch.tensor(sizes), persistent=False)
+            self.register_buffer("angle", torch.tensor([kind == "angle" for kind in self.kinds]), persistent=False)
+            categories = torch.tensor([not isinstance(kind, str) for kind in self.kinds])
+            self.register_buffer("category", categories, persistent=False)
         # A number of edges stands for those that a file brings.
-        rows = None if edges is None or isinstance(edges, int) else _edges(edges, self.sensors, self.bins)
+        rows = None if edges is None or isinstance(edges, int) else _edges(edges, self.sensors, self.bins, self.kinds)
         self._edge_count = edges if isinstance(edges, int) else None if rows is None else rows.shape[1]
         self._own(None)
         if rows is not None:
@@ -71,10 +103,15 @@ class ThresholdFeatures(Encoder):
         return min(self.subset or self.sensors, self.sensors)
 
     def own_layout(self) -> Layout:
-        """`start_codes` `[d]`; `sensor`, `threshold` and `above` `[subset, d]`; `edges` `[n, edges]` where given."""
+        """`start_codes` `[d]`; `sensor`, `threshold` and `above` `[subset, d]`; where needed `members` and `edges`.
+
+        `members` `[subset, d, c]` holds halves of the categories, `edges` `[n, edges]` what was given.
+        """
         shape = self._most, self.vsa.dim
         layout: Layout = {"start_codes": (self.vsa.dtype, (self.vsa.dim,))}
         layout |= {"sensor": (torch.int64, shape), "threshold": (torch.int64, shape), "above": (torch.bool, shape)}
+        if self._most_categories:
+            layout["members"] = torch.bool, (*shape, self._most_categories)
         if self._edge_count is not None:
             layout["edges"] = torch.float64, (self.sensors, self._edge_count)
         return layout
@@ -82,7 +119,8 @@ class ThresholdFeatures(Encoder):
     def config(self) -> dict[str, Any]:
         """See `Part.config`."""
         options = {"sensors": self.sensors, "bins": self.bins, "subset": self.subset, "edges": self._edge_count}
-        return {"name": self.name, **options}
+        # Left out where all are real, as in files that know no kinds.
+        return {"name": self.name, **options} | ({} if self.kinds is None else {"kinds": list(self.kinds)})
 
     def check(self) -> None:
         """See `Part.check`."""
@@ -92,19 +130,26 @@ class ThresholdFeatures(Encoder):
             if not ((tensor >= 0) & (tensor < end)).all():
                 raise ValueError(f"{name} must hold numbers in [0, {end})")
         if self._edge_count is not None:
-            _edges(list(self.edges), self.sensors, self.bins)
+            _edges(list(self.edges), self.sensors, self.bins, self.kinds)
 
     def cells(self, x: Float[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
-        """The bin of each reading."""
+        """The bin of each reading: of an angle 1 is in the first one; of a category it is its number."""
+        found = self._bins(x)
+        return found if self.kinds is None else torch.where(self.angle & (x >= 1), 0, found)
+
+    def _bins(self, x: Float[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
+        even = self.bins if self.kinds is None else self.sizes
         if self._edge_count is None:
-            return binned(x, self.bins)
-        x = x.clamp(0, 1)
+            return binned(x, even)
+        within = x.clamp(0, 1)
         if torch.compiler.is_exporting():
             # The same by comparisons: interchange formats have no bucket search.
-            found = (x[..., None] >= self.edges).sum(-1)
+            found = (within[..., None] >= self.edges).sum(-1)
         else:
-            columns = x.to(torch.float64).T.contiguous()
+            columns = within.to(torch.float64).T.contiguous()
             found = torch.searchsorted(self.edges, columns, right=True).T
+        if self.kinds is not None:
+            found = torch.where(self.angle | self.category, binned(within, even), found)
         return torch.where(x.isnan(), -1, found)
 
     def encode(self, cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
@@ -113,9 +158,9 @@ class ThresholdFeatures(Encoder):
         columns = cells.T.contiguous()
         missing = columns < 0
         against = blind = None
-        for sensor, threshold, above in zip(self.sensor, self.threshold, self.above, strict=True):
+        for place, (sensor, above) in enumerate(zip(self.sensor, self.above, strict=True)):
             unseen = missing.index_select(0, sensor)
-            side = columns.index_select(0, sensor) > threshold[:, None]
+            side = self._side(place, columns.index_select(0, sensor))
             apart = (side ^ above[:, None]) & ~unseen
             against = apart if against is None else against | apart
             blind = unseen if blind is None else blind & unseen
@@ -126,12 +171,32 @@ class ThresholdFeatures(Encoder):
             return self.start_codes ^ negated
         return torch.where(negated, self.vsa.negative(self.start_codes), self.start_codes)
 
+    def _side(self, place: int, cells: Int64[Tensor, "d batch"]) -> Bool[Tensor, "d batch"]:
+        """The answers to the question that each dimension asks at this place, where yes and no are drawn alike."""
+        threshold = self.threshold[place]
+        side = cells > threshold[:, None]
+        if self.kinds is None:
+            return side
+        sensor = self.sensor[place]
+        # A half circle that does not hold the end of the range; the others are its opposites.
+        reach = torch.where(self.angle, self.bins // 2, self.bins).index_select(0, sensor)
+        side = side & (cells <= (threshold + reach)[:, None])
+        if not self._most_categories:
+            return side
+        # Cells of other kinds are looked up in vain.
+        chosen = self.members[place].gather(1, cells.clamp(0, self._most_categories - 1))
+        category = self.category.index_select(0, sensor)[:, None]
+        # Not `torch.where`, which onnxruntime does not know for booleans.
+        return (chosen & category) | (side & ~category)
+
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
-        vsa, most = self.vsa, self._most
+        vsa, most, categories = self.vsa, self._most, self._most_categories
+        # Random numbers, their ranks and twice those are 20 bytes for each category.
         require_memory(
-            16 * vsa.dim * (self.sensors + most),
-            f"drawing thresholds for {self.sensors:,} sensors at d = {vsa.dim:,}",
-            "take fewer sensors or dimensions",
+            vsa.dim * (16 * (self.sensors + most) + (most + 20) * categories),
+            f"drawing thresholds for {self.sensors:,} sensors at d = {vsa.dim:,}"
+            + (f" with up to {categories:,} categories" if categories else ""),
+            "take fewer sensors, categories or dimensions",
         )
         start = vsa.random(generator=generator)
         sizes = torch.randint(1, most + 1, (vsa.dim,), generator=generator)
@@ -140,23 +205,59 @@ class ThresholdFeatures(Encoder):
         # Where a dimension has fewer sensors, its first one is in their places too.
         spare = torch.arange(most)[:, None] >= sizes
         threshold = torch.zeros(most, vsa.dim, dtype=torch.int64)
+        members = torch.zeros(most, vsa.dim, categories, dtype=torch.bool)
         for place in range(most):
-            for sensor in range(self.sensors):
+            for sensor, kind in enumerate(self.kinds or ["real"] * self.sensors):
                 held = ((chosen[place] == sensor) & ~spare[place] & ~constant).nonzero()[:, 0]
+                if isinstance(kind, int):
+                    ranks = torch.rand(len(held), kind, generator=generator).argsort(-1)
+                    members[place, held, :kind] = 2 * ranks < kind
+                    continue
                 held = held[torch.randperm(len(held), generator=generator)]
                 # The i-th of k dimensions passes somewhere in the i-th of k equal stretches of the range.
                 spread = (torch.arange(len(held)) + torch.rand(len(held), generator=generator)) / max(len(held), 1)
-                threshold[place, held] = (spread * (self.bins - 1)).long().clamp(max=max(self.bins - 2, 0))
+                # An angle asks for half as many: beyond them come the opposite half circles.
+                count = self.bins - 1 if kind == "real" else self.bins // 2
+                threshold[place, held] = (spread * count).long().clamp(max=max(count - 1, 0))
         above = torch.rand(most, vsa.dim, generator=generator) < 0.5
-        # Nothing is above the highest bin.
+        # Nothing is above the highest bin, nor in no category.
         threshold[0, constant], above[0, constant] = self.bins - 1, True
         drawn = {"start_codes": start}
         for name, tensor in (("sensor", chosen), ("threshold", threshold), ("above", above)):
             drawn[name] = torch.where(spare, tensor[0], tensor)
+        if categories:
+            drawn["members"] = torch.where(spare[..., None], members[0], members)
         return drawn
 
 
-def _edges(edges: Sequence[Tensor], sensors: int, bins: int) -> Float64[Tensor, "n edges"]:
+def _kinds(kinds: Sequence[Kind] | None, sensors: int, bins: int) -> tuple[Kind, ...] | None:
+    """The kinds of all sensors, None if all are real. Raises `ValueError` naming the sensor for what is no kind."""
+    if kinds is None:
+        return None
+    if isinstance(kinds, str) or not isinstance(kinds, Sequence) or len(kinds) != sensors:
+        raise ValueError(f"kinds must be given for each of {sensors} sensors, in a list; got {kinds!r:.200}")
+    checked: list[Kind] = []
+    for sensor, kind in enumerate(kinds):
+        what = f"the kind of sensor {sensor} is 'real', 'angle', or a number of categories from 2 to 2^20"
+        if isinstance(kind, str):
+            if kind not in ("real", "angle"):
+                raise ValueError(f"{what}; got {kind!r:.200}")
+            if kind == "angle" and bins % 2:
+                raise ValueError(
+                    f"sensor {sensor} is an angle, whose half circles need an even number of bins; got {bins}"
+                )
+            checked.append(kind)
+            continue
+        number = whole_number(kind, what)
+        if not 2 <= number <= _MOST_CATEGORIES:
+            raise ValueError(f"{what}; got {number}")
+        checked.append(number)
+    return None if all(kind == "real" for kind in checked) else tuple(checked)
+
+
+def _edges(
+    edges: Sequence[Tensor], sensors: int, bins: int, kinds: Sequence[Kind] | None
+) -> Float64[Tensor, "n edges"]:
     """The edges of all sensors, padded with infinity. Raises `ValueError` unless they are sorted and fit the bins."""
     if len(edges) != sensors:
         raise ValueError(f"edges must be given for each of {sensors} sensors; got {len(edges)} of them")
@@ -164,6 +265,8 @@ def _edges(edges: Sequence[Tensor], sensors: int, bins: int) -> Float64[Tensor, 
     for sensor, row in enumerate(rows):
         if row.isnan().any() or (row[1:] < row[:-1]).any() or (row < 0).any() or (row[row.isfinite()] > 1).any():
             raise ValueError(f"the edges of sensor {sensor} must be sorted and from 0 to 1")
+        if kinds is not None and kinds[sensor] != "real" and row.isfinite().any():
+            raise ValueError(f"sensor {sensor} is an angle or a category, which has no edges; give it an empty tensor")
         if len(row) >= bins and row[bins - 1 :].isfinite().any():
             raise ValueError(
                 f"sensor {sensor} has {len(row)} edges, which part one bin more than that; the encoder has {bins}"

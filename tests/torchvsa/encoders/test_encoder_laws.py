@@ -46,6 +46,7 @@ ROWS: dict[str, Callable[[VSA], Encoder]] = {
     "history": lambda vsa: History(Sum(Level(vsa, 8), 2), [1, 3]),
 }
 EDGES = [torch.tensor([0.25, 0.5]), torch.tensor([0.125, 0.125, 0.75])]
+NONE = torch.tensor([])
 MORE: dict[str, Callable[[VSA], Encoder]] = {
     "sum of mixed bins": lambda vsa: Sum([Level(vsa, 8), Circular(vsa, 6), Lookup(vsa, 3)]),
     "subset product of mixed bins": lambda vsa: SubsetProduct([Level(vsa, 8), Circular(vsa, 6), Lookup(vsa, 3)]),
@@ -53,6 +54,11 @@ MORE: dict[str, Callable[[VSA], Encoder]] = {
     "sum of powers and bins": lambda vsa: Sum([FractionalPower(vsa), Level(vsa, 8)]),
     "waves": lambda vsa: RandomFourier(vsa, 2, sign=False),
     "edges": lambda vsa: ThresholdFeatures(vsa, 2, 9, edges=EDGES),
+    "kinds": lambda vsa: ThresholdFeatures(vsa, 4, 8, 2, kinds=["real", "angle", 3, 2]),
+    "kinds and edges": lambda vsa: ThresholdFeatures(
+        vsa, 3, 8, edges=[EDGES[0], NONE, NONE], kinds=["real", "angle", 5]
+    ),
+    "history of kinds": lambda vsa: History(ThresholdFeatures(vsa, 2, 8, kinds=["angle", 4]), [1]),
     "held history": lambda vsa: History(Product(Level(vsa, 8), 2), [1, 2], hold=True),
     "held present": lambda vsa: History(Sum(Lookup(vsa, 4), 2), [], hold=True),
     "history of powers": lambda vsa: History(Sum(FractionalPower(vsa), 2), [2]),
