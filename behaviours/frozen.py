@@ -103,7 +103,8 @@ class _Tick:
         """None where one of the parts has no form in NumPy."""
         space, readout = frozen.space, frozen.readout
         encode = row_encoder(space.encoder, space.protect)
-        if encode is None or readout.programs.device.type != "cpu":
+        all_real = all(sensor.kind == "real" for sensor in space.schema.sensors)
+        if encode is None or not all_real or readout.programs.device.type != "cpu":
             return None
         return cls(frozen, encode, noise(space.vsa, readout.programs.numpy()))
 

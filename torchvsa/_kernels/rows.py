@@ -160,6 +160,8 @@ def _record(encoder: Any, join: Row) -> Row | None:
 
 
 def _thresholds(encoder: Any, _: Verbs) -> Row | None:
+    if encoder.kinds is not None:
+        return None
     vsa, bins = encoder.vsa, encoder.bins
     start, negative = encoder.start_codes.numpy(), vsa.negative(encoder.start_codes).resolve_neg().numpy()
     # Small numbers are compared several at once.
