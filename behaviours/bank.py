@@ -1,18 +1,24 @@
 """Several named behaviours over one space of codebooks."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
-from torch import nn
+import torch
+from jaxtyping import Shaped
+from torch import Tensor, nn
 
+from behaviours.algebra import described, terms_from
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import Gradient, Rule, check_rule
 from behaviours.progress import Progress, silent
+from behaviours.recall import Recall, asked_once
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from behaviours.storage import Layout, check_layout, load_tensors, naming, save_tensors
+from torchvsa.blocks import by_blocks
 
 
 class BehaviourBank(nn.Module):
@@ -72,11 +78,45 @@ class BehaviourBank(nn.Module):
             )
         if behaviour.space is not self.space:
             behaviour = behaviour.over(self.space)
+        behaviour.name = name
         if name in self._names:
             self._behaviours[self._names.index(name)] = behaviour
         else:
             self._names.append(name)
             self._behaviours.append(behaviour)
+
+    # -- asking all ---------------------------------------------------------------------------------------
+
+    def forward(self, readings: Any) -> dict[str, Recall]:
+        """What every behaviour answers, by name, to readings `[B, n]`; see `Behaviour`. Conditions are encoded once."""
+        return self.answer(self.space.cells(readings))
+
+    def start(self, episodes: Sized) -> Any:
+        """See `Controller.start`."""
+        return self.space.start(len(episodes))
+
+    def step(self, readings: Any, state: Any) -> tuple[dict[str, Recall], Any]:
+        """See `Controller.step`: one answer per behaviour, by name."""
+        cells, state = self.space.step(readings, state)
+        return self.answer(cells), state
+
+    def answer(self, cells: Shaped[Tensor, "batch w"]) -> dict[str, Recall]:
+        """What every behaviour answers to cells as `Space.cells` returns them."""
+        if not len(self):
+            return {}
+        recall = asked_once(partial(by_blocks, self._ask_all, row_bytes=8 * self.space.vsa.dim), cells)
+        blind = (cells < 0).all(-1)
+        commands, similarity, margin, familiarity, _ = recall
+        # One behaviour after the other, in the second dimension.
+        columns = zip(*(field.unbind(1) for field in (commands, similarity, margin, familiarity)), strict=True)
+        return {name: Recall(*column).blank(blind) for name, column in zip(self, columns, strict=True)}
+
+    def _ask_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
+        conditions = self.space.encode(cells)
+        answers = [self[name].ask(conditions) for name in self]
+        return Recall(*(torch.stack([getattr(answer, f) for answer in answers], 1) for f in Recall._fields[:4]))
+
+    # -- as a mapping -------------------------------------------------------------------------------------
 
     @property
     def names(self) -> list[str]:
@@ -97,6 +137,13 @@ class BehaviourBank(nn.Module):
     def __len__(self) -> int:
         return len(self._names)
 
+    def __repr__(self) -> str:
+        schema = self.space.schema
+        head = f"d={self.space.vsa.dim}, {len(schema.sensors)} sensors, {len(schema.actuators)} actuators"
+        return "\n  ".join([f"BehaviourBank({head})", *(repr(self[name]) for name in self)])
+
+    # -- files --------------------------------------------------------------------------------------------
+
     def save(self, path: str | Path) -> Path:
         """Write codebooks and programs to one safetensors file, whole or not at all.
 
@@ -112,7 +159,7 @@ class BehaviourBank(nn.Module):
                 behaviour.check()
             parts = {"program": behaviour.program, "known": behaviour.known, "results": behaviour.results}
             tensors |= {f"behaviours.{number}.{key}": tensor for key, tensor in parts.items()}
-        behaviours = [{"name": name, "report": self[name].report.to_dict()} for name in self]
+        behaviours = [_described(name, self[name]) for name in self]
         return save_tensors(path, "bank", tensors, {"space": space, "behaviours": behaviours})
 
     @classmethod
@@ -125,17 +172,18 @@ class BehaviourBank(nn.Module):
         tensors, about = load_tensors(path, "bank")
         with naming(f"{path} does not describe a bank of this version"):
             with naming("behaviours"):
-                described = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
-                for name, _ in described:
+                entries = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
+                terms = [entry.get("terms") for entry in about["behaviours"]]
+                for name, _ in entries:
                     check_name(name)
-                if len({name for name, _ in described}) < len(described):
+                if len({name for name, _ in entries}) < len(entries):
                     raise ValueError("two of them have the same name")
             with naming("space"):
                 codebooks = _codebooks(about["space"])
                 check_layout(
                     {name: tensor for name, tensor in tensors.items() if not name.startswith("behaviours.")}, codebooks
                 )
-            parts = {f"behaviours.{number}.{key}" for number in range(len(described)) for key in _PARTS}
+            parts = {f"behaviours.{number}.{key}" for number in range(len(entries)) for key in _PARTS}
             if wrong := sorted(parts ^ (tensors.keys() - codebooks.keys())):
                 raise ValueError(f"tensor {wrong[0]!r} is {'missing' if wrong[0] in parts else 'not described'}")
             with naming("space"):
@@ -143,10 +191,13 @@ class BehaviourBank(nn.Module):
                     about["space"], {name.removeprefix("space."): tensors[name] for name in codebooks}
                 )
             bank = cls(space)
-            for number, (name, report) in enumerate(described):
+            for number, (name, report) in enumerate(entries):
                 with naming(f"behaviour {name!r}"):
-                    stored = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
-                    behaviour = Behaviour(space, *stored, report=report)
+                    program, known, results = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
+                    behaviour = Behaviour(space, program, known, results, report)
+                    if terms[number] is not None:
+                        made_of = terms_from(terms[number], behaviour.results)
+                        behaviour = Behaviour(space, program, known, results, report, made_of)
                 bank.add(name, behaviour)
         return bank
 
@@ -156,6 +207,12 @@ _PARTS = ("program", "known", "results")
 
 def _codebooks(config: dict[str, Any]) -> Layout:
     return {f"space.{name}": wanted for name, wanted in Space.layout(config).items()}
+
+
+def _described(name: str, behaviour: Behaviour) -> dict[str, Any]:
+    entry = {"name": name, "report": behaviour.report.to_dict()}
+    # Of a behaviour that is no sum, all is said.
+    return entry | ({"terms": described(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
 
 
 def check_name(name: object) -> None:

@@ -1,17 +1,23 @@
 """One learned behaviour: a program of d numbers, and what it takes to ask it."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+from numbers import Real
 from typing import Any
 
 import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
+from behaviours.algebra import Term, added, checked_weight, report_of, results_of, weighted_sum
 from behaviours.controller import Controller
 from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
 from behaviours.recall import Recall, recalled
 from behaviours.report import LearningReport
+from behaviours.schema import Actuator, Sensor
 from behaviours.space import Space
+from behaviours.storage import checksum
 from torchvsa import VSA, Readout, ShapeError
 from torchvsa.blocks import by_blocks
 from torchvsa.exact import is_integer, signed
@@ -23,7 +29,17 @@ class Behaviour(Controller):
     `known` `[d]` is the sum of the conditions that it knows; both are raw accumulators, see `clipped`. `memory`
     holds the results that it can answer with.
 
-    Source: Neubert et al. 2016, Algorithm 2.
+    Behaviours over one space add up to behaviours:
+
+        both = seek + 2 * avoid
+        both - avoid            # the program of seek + avoid, bit for bit if programs are integers
+        -flee                   # answers what flee answers least
+
+    Program and known conditions are the weighted sums of theirs. A sum answers with the results of all its `terms`, and
+    what is taken away as often as it was added is gone, with the results that only it had. The scores of a sum are the
+    weighted sums of the scores (`scores`), so that adding is voting.
+
+    Source: Neubert et al. 2016, Algorithm 2; sums of programs, section V.
     """
 
     program: Tensor
@@ -36,12 +52,16 @@ class Behaviour(Controller):
         known: Shaped[Tensor, "d"],
         results: Int64[Tensor, "k m"],
         report: LearningReport,
+        terms: Sequence[Term] = (),
     ) -> None:
         super().__init__()
         for name, vector in (("program", program), ("known", known)):
             _check_vector(space.vsa, name, vector)
         self.space = space
         self.report = report
+        self.name = ""
+        """The name under which a bank keeps it."""
+        self._terms = tuple(terms)
         if isinstance(program, nn.Parameter):
             self.register_parameter("program", program)
         else:
@@ -61,7 +81,63 @@ class Behaviour(Controller):
         program = self.program.detach().to(device)
         if isinstance(self.program, nn.Parameter):
             program = nn.Parameter(program)
-        return Behaviour(space, program, self.known.to(device), self.results.to(device), self.report)
+        return Behaviour(space, program, self.known.to(device), self.results.to(device), self.report, self._terms)
+
+    # -- sums ---------------------------------------------------------------------------------------------
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The learned behaviours of which it is a weighted sum; itself, if it is none."""
+        if self._terms:
+            return self._terms
+        tensors = {"program": self.program.detach(), "known": self.known, "results": self.results}
+        fingerprint = checksum({}, {name: tensor.cpu().contiguous() for name, tensor in tensors.items()})
+        return (Term(self.name, 1, self.report, self.results.cpu(), fingerprint),)
+
+    @classmethod
+    def sum(cls, behaviours: Sequence["Behaviour"], weights: Sequence[float] | None = None) -> "Behaviour":
+        """The weighted sum of behaviours over equal spaces, exact where programs and weights are whole.
+
+        Raises `ValueError` for behaviours over different codebooks, for weights that are no finite numbers, and if
+        nothing is left: everything cancels, or all weights are 0.
+        """
+        weights = [checked_weight(weight) for weight in ([1] * len(behaviours) if weights is None else weights)]
+        held = [(part, weight) for part, weight in zip(behaviours, weights, strict=True) if weight]
+        if not held:
+            raise ValueError("a sum of behaviours needs at least one with a weight that is not 0")
+        space = held[0][0].space
+        if not all(space.same_as(part.space) for part, _ in held):
+            raise ValueError("behaviours over different spaces (other sensors, codes or seeds) do not add up")
+        terms = added([replace(t, weight=weight * t.weight) for part, weight in held for t in part.terms])
+        if not terms:
+            raise ValueError("nothing is left of this sum: its behaviours cancel each other")
+        parts, weights = [part.over(space) for part, _ in held], [weight for _, weight in held]
+        program = weighted_sum(space.vsa, weights, [part.program.detach() for part in parts])
+        known = weighted_sum(space.vsa, weights, [part.known for part in parts])
+        return cls(space, program, known, results_of(terms).to(space.device), report_of(terms), terms)
+
+    def __add__(self, other: object) -> "Behaviour":
+        return Behaviour.sum([self, other]) if isinstance(other, Behaviour) else NotImplemented
+
+    def __radd__(self, other: object) -> "Behaviour":
+        # `sum` of Python begins with 0.
+        return self if isinstance(other, int) and other == 0 else NotImplemented
+
+    def __sub__(self, other: object) -> "Behaviour":
+        return Behaviour.sum([self, other], [1, -1]) if isinstance(other, Behaviour) else NotImplemented
+
+    def __neg__(self) -> "Behaviour":
+        return Behaviour.sum([self], [-1])
+
+    def __mul__(self, weight: Any) -> "Behaviour":
+        return Behaviour.sum([self], [checked_weight(weight)]) if isinstance(weight, Real) else NotImplemented
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, weight: Any) -> "Behaviour":
+        return self * (1 / weight) if isinstance(weight, Real) else NotImplemented
+
+    # -- answers ------------------------------------------------------------------------------------------
 
     @property
     def results(self) -> Int64[Tensor, "k m"]:
@@ -139,6 +215,21 @@ class Behaviour(Controller):
         vsa = self.space.vsa
         program = vsa.normalize(self.program.detach())
         return Behaviour(self.space, program, vsa.normalize(self.known), self.results, self.report)
+
+    def __repr__(self) -> str:
+        schema, report = self.space.schema, self.report
+        name = f"{self.name!r}, " if self.name else ""
+        made = f"sum of {', '.join(report.terms)}" if report.terms else f"{report.rule}, {report.pairs} pairs"
+        return (
+            f"Behaviour({name}d={self.space.vsa.dim}, {listed('sensors', schema.sensors)}, "
+            f"{listed('actuators', schema.actuators)}, {made}, {len(self.results)} results)"
+        )
+
+
+def listed(what: str, parts: Sequence[Sensor] | Sequence[Actuator], most: int = 6) -> str:
+    """How many there are, and the names of the first of them."""
+    names = ", ".join(part.name for part in parts[:most]) + (", ..." if len(parts) > most else "")
+    return f"{len(parts)} {what} ({names})"
 
 
 _REAL = (torch.int8, torch.int32, torch.int64, torch.float32, torch.float64)

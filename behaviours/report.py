@@ -1,6 +1,7 @@
 """What a learning rule did with a demonstration."""
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from typing import Any
 
 from behaviours.options import store, whole
 
@@ -32,12 +33,19 @@ class LearningReport:
     """Pairs that a trained program still recalls wrongly, or below the margin asked for."""
     presumed_known: int = 0
     """Samples taken as known for their likeness to earlier pieces: truly or falsely, nobody remembers."""
+    terms: tuple[str, ...] = ()
+    """Of a sum of behaviours, what it is made of: `("seek", "2 * avoid")`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.rule, str):
             raise ValueError(f"the rule of a report is the name of one; got {self.rule!r}")
-        counts = {name: value for name, value in vars(self).items() if name != "rule"}
-        store(self, **{name: whole(name, value, 0) for name, value in counts.items()})
+        if isinstance(self.terms, str) or not all(isinstance(term, str) for term in self.terms):
+            raise ValueError(f"the terms of a report are a tuple of texts; got {self.terms!r}")
+        counts = {name: whole(name, value, 0) for name, value in self._counts().items()}
+        store(self, **counts, terms=tuple(self.terms))
+
+    def _counts(self) -> dict[str, int]:
+        return {name: value for name, value in vars(self).items() if name not in ("rule", "terms")}
 
     @property
     def pairs(self) -> int:
@@ -46,9 +54,10 @@ class LearningReport:
 
     def then(self, later: "LearningReport") -> "LearningReport":
         """The report of two pieces of demonstration: counts add up; `wrong` is known of the later one only."""
-        counts = {key: value + getattr(later, key) for key, value in asdict(self).items() if key != "rule"}
-        return LearningReport(later.rule, **counts | {"wrong": later.wrong})
+        counts: dict[str, Any] = {key: value + getattr(later, key) for key, value in self._counts().items()}
+        counts["wrong"] = later.wrong
+        return LearningReport(later.rule, **counts)
 
-    def to_dict(self) -> dict[str, str | int]:
-        """Plain values, for a file."""
-        return asdict(self)
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values, for a file; `terms` only where there are some."""
+        return {"rule": self.rule, **self._counts()} | ({"terms": list(self.terms)} if self.terms else {})

@@ -1,7 +1,7 @@
 """A demonstration as a learning rule sees it: distinct conditions, distinct results, and who met whom."""
 
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import torch
 from jaxtyping import Bool, Int64, Shaped
@@ -85,7 +85,7 @@ class Samples:
         counts = torch.bincount(self.condition * shape[1] + self.result, minlength=shape[0] * shape[1]).view(shape)
         return counts.gather(1, answers[:, None])[:, 0] < counts.amax(1)
 
-    def report(self, rule: str, **counts: int) -> LearningReport:
+    def report(self, rule: str, **counts: Any) -> LearningReport:
         """The report of a rule that trains on all conditions, with its further `counts`."""
         samples, distinct = len(self.condition), len(self.conditions)
         return LearningReport(rule, samples=samples, new=distinct, truly_known=samples - distinct, **counts)
