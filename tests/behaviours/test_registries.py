@@ -3,7 +3,6 @@
 import pytest
 
 from behaviours import POLICIES, RULES, OneShot, Priority
-from behaviours.learning import check_rule
 from torchvsa.registry import Registry
 
 
@@ -20,17 +19,21 @@ def test_names_and_the_error_that_lists_them(registry: Registry[object], kind: s
         registry.find("guess")
 
 
-def test_what_joins_is_found_and_named(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_is_taken_is_refused() -> None:
+    class Mine(Priority):
+        pass
+
+    taken = r"another policy 'priority' already: behaviours.composition.priority.Priority; .*Mine needs another name"
+    with pytest.raises(ValueError, match=taken):
+        POLICIES.register("priority", Mine)
+    assert POLICIES.find("priority") is Priority
+
+
+def test_a_rule_that_joins_is_found() -> None:
     class Mine(OneShot):
         name = "mine"
 
-    monkeypatch.setattr(RULES, "_parts", dict(RULES))
-    RULES.register(Mine.name, Mine)
-    assert RULES.find("mine") is Mine
-    with pytest.raises(TypeError, match=r"write Mine\(\) for 'mine'"):
-        check_rule("mine")
-    with pytest.raises(
-        ValueError, match=r"another policy 'priority' already: behaviours.composition.priority.Priority"
-    ):
-        POLICIES.register("priority", Mine)  # type: ignore[arg-type]
-    assert POLICIES.find("priority") is Priority
+    rules = Registry(RULES.kind, dict(RULES))
+    rules.register(Mine.name, Mine)
+    assert rules.find("mine") is Mine
+    assert "mine" not in RULES
