@@ -1,14 +1,17 @@
 """Names and numbers in `conf/` become parts. Parts are looked up in registries: no config names code to run."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 import sim
 import torchvsa
 from behaviours import POLICIES, RULES, Actuator, BehaviourBank, Policy, Rule, Schema, Sensor, Space
 from torchvsa import VSA
 from torchvsa.encoders import Encoder, Product, SubsetProduct, Sum, ThresholdFeatures, value_encoder
+from torchvsa.registry import Registry
+
+T = TypeVar("T")
 
 COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
@@ -71,12 +74,12 @@ def encoder(
 
 def rule(options: Mapping[str, Any]) -> Rule:
     """The learning rule of the group `rule`."""
-    return _pick(RULES, "learning rule", options)
+    return _pick(RULES, options)
 
 
 def policy(bank: BehaviourBank, options: Mapping[str, Any]) -> Policy:
     """The policy of the group `composition`, over all behaviours of the bank."""
-    return _pick(POLICIES, "policy", options, bank)
+    return _pick(POLICIES, options, bank)
 
 
 def arena(options: Mapping[str, Any]) -> sim.Arena:
@@ -86,9 +89,6 @@ def arena(options: Mapping[str, Any]) -> sim.Arena:
     return replace(sim.ARENAS[options["preset"]], **options["change"])
 
 
-def _pick(registry: Mapping[str, Any], kind: str, options: Mapping[str, Any], *arguments: Any) -> Any:
+def _pick(registry: Registry[Callable[..., T]], options: Mapping[str, Any], *arguments: Any) -> T:
     choices = dict(options)
-    name = choices.pop("name")
-    if name not in registry:
-        raise ValueError(f"there is no {kind} {name!r}; choose one of {', '.join(registry)}")
-    return registry[name](*arguments, **choices)
+    return registry.find(choices.pop("name"))(*arguments, **choices)

@@ -3,11 +3,15 @@
 from collections.abc import Iterator, Mapping
 from typing import Generic, TypeVar
 
+from torchvsa import plugins
+
 T = TypeVar("T")
 
 
 class Registry(Mapping[str, T], Generic[T]):
     """Named parts of one kind. A part from outside joins by `register`, see `torchvsa.plugins`.
+
+    Installed plugins are imported when they are needed: for a name that is not there, and for a list of all names.
 
     >>> from torchvsa.registry import Registry
     >>> rules = Registry("learning rule")
@@ -22,27 +26,57 @@ class Registry(Mapping[str, T], Generic[T]):
         self._parts: dict[str, T] = dict(parts or {})
 
     def register(self, name: str, part: T) -> None:
-        """Add a part. Raises `ValueError` if another one has the name already."""
+        """Add a part. Raises `ValueError` if another one has the name already.
+
+        A class or function of the same module and name takes the place of the former one, as when a module is
+        reloaded or a cell of a notebook runs again.
+        """
         if not isinstance(name, str) or not name:
             raise ValueError(f"the name of a {self.kind} is a text that is not empty; got {name!r}")
-        if self._parts.get(name, part) is not part:
-            raise ValueError(f"there is another {self.kind} {name!r} already: {self._parts[name]!r}")
+        other = self._parts.get(name, part)
+        if other is not part and not _defined_again(other, part):
+            raise ValueError(
+                f"there is another {self.kind} {name!r} already: {_described(other)}; {_described(part)} needs another "
+                "name"
+            )
         self._parts[name] = part
 
     def find(self, name: object) -> T:
-        """The part of this name. Raises `ValueError` that lists the names there are."""
-        if not isinstance(name, str) or name not in self._parts:
-            raise ValueError(f"there is no {self.kind} {name!r}; choose one of {', '.join(self._parts)}")
-        return self._parts[name]
+        """The part of this name. Raises `ValueError` that lists the names there are, and plugins that failed."""
+        if isinstance(name, str) and name in self:
+            return self._parts[name]
+        message = f"there is no {self.kind} {name!r}; choose one of {', '.join(self)}"
+        raise ValueError("; ".join([message, *plugins.failures()]))
 
     def __getitem__(self, name: str) -> T:
+        if name not in self._parts:
+            plugins.load()
         return self._parts[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._parts)
+        plugins.load()
+        return iter(tuple(self._parts))
 
     def __len__(self) -> int:
+        plugins.load()
         return len(self._parts)
 
     def __repr__(self) -> str:
         return f"Registry({self.kind!r}, {list(self._parts)})"
+
+
+def _where(part: object) -> tuple[str, str] | None:
+    """The module and the name of a class or function."""
+    module, name = (getattr(part, attribute, None) for attribute in ("__module__", "__qualname__"))
+    return (module, name) if isinstance(module, str) and isinstance(name, str) else None
+
+
+def _defined_again(a: object, b: object) -> bool:
+    where = _where(a)
+    # Functions make any number of classes of one name.
+    return where is not None and where == _where(b) and "<locals>" not in where[1]
+
+
+def _described(part: object) -> str:
+    where = _where(part)
+    return repr(part) if where is None else ".".join(where)

@@ -1,9 +1,13 @@
 """Policies that combine the behaviours of a bank, by name."""
 
+from collections.abc import Callable
+
 from behaviours.composition.base import Policy
 from behaviours.composition.bundle import Bundle
 from behaviours.composition.priority import Priority
+from torchvsa.registry import Registry
 
-POLICIES: dict[str, type[Policy]] = {"bundle": Bundle, "priority": Priority}
+POLICIES: Registry[Callable[..., Policy]] = Registry("policy", {"bundle": Bundle, "priority": Priority})
+"""A policy is made of a bank and its options."""
 
 __all__ = ["POLICIES", "Bundle", "Policy", "Priority"]

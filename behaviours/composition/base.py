@@ -20,7 +20,8 @@ class Policy(Controller):
 
     `names` says which behaviours take part; `Recall.speaker` counts within it. A policy is a snapshot: it holds the
     behaviours that the bank had when the policy was made, and what the bank learns later does not change it. A new
-    policy implements `ask` and is listed in `behaviours.composition.POLICIES`.
+    policy implements `ask` and is registered in `behaviours.composition.POLICIES`; one with a memory implements `start`
+    and `step` as well.
     """
 
     def __init__(self, bank: BehaviourBank, names: list[str]) -> None:

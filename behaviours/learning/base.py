@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Rule(ABC):
-    """Turns a demonstration into a behaviour. A new rule is one class, listed in `behaviours.learning.RULES`."""
+    """Turns a demonstration into a behaviour. A new rule is one class, registered in `behaviours.learning.RULES`."""
 
     name: ClassVar[str]
     counts: ClassVar[bool] = True

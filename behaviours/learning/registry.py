@@ -7,8 +7,11 @@ from behaviours.learning.error_driven import ErrorDriven
 from behaviours.learning.gradient import Gradient
 from behaviours.learning.least_squares import LeastSquares
 from behaviours.learning.one_shot import OneShot
+from torchvsa.registry import Registry
 
-RULES: dict[str, type[Rule]] = {rule.name: rule for rule in (OneShot, ErrorDriven, LeastSquares, Gradient)}
+RULES: Registry[type[Rule]] = Registry(
+    "learning rule", {rule.name: rule for rule in (OneShot, ErrorDriven, LeastSquares, Gradient)}
+)
 
 
 def check_rule(rule: Any) -> Rule:
@@ -18,6 +21,6 @@ def check_rule(rule: Any) -> Rule:
     if isinstance(rule, type) and issubclass(rule, Rule):
         raise TypeError(f"a rule is an object, not its class; write {rule.__name__}() for {rule.__name__}")
     if isinstance(rule, str) and rule in RULES:
-        raise TypeError(f"a rule is an object, not its name; write {RULES[rule].__name__}() for {rule!r}")
+        raise TypeError(f"a rule is an object, not its name; write {RULES.find(rule).__name__}() for {rule!r}")
     written = ", ".join(f"{kind.__name__}()" for kind in RULES.values())
     raise TypeError(f"a rule is an object, such as {written}; got {rule!r}")

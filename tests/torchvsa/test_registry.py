@@ -4,7 +4,7 @@ import pytest
 
 import torchvsa
 from torchvsa import ARCHITECTURES, PROTECTIONS, protection
-from torchvsa.encoders import ENCODERS, VALUE_ENCODERS, Level, encoder, value_encoder
+from torchvsa.encoders import ENCODERS, VALUE_ENCODERS, Level, Lookup, encoder, value_encoder
 from torchvsa.registry import Registry
 
 ALL = [ARCHITECTURES, PROTECTIONS, ENCODERS, VALUE_ENCODERS]
@@ -40,6 +40,29 @@ def test_a_name_is_given_once() -> None:
     assert repr(registry) == "Registry('part', ['one', 'two'])"
     with pytest.raises(KeyError):
         registry["three"]
+
+
+def test_an_error_names_both_parts_of_one_name() -> None:
+    registry: Registry[object] = Registry("value encoder", {"level": Level})
+    with pytest.raises(
+        ValueError,
+        match=r"another value encoder 'level' already: torchvsa.encoders.level.Level; "
+        r"torchvsa.encoders.lookup.Lookup needs another name",
+    ):
+        registry.register("level", Lookup)
+    assert registry.find("level") is Level
+
+
+def test_a_module_may_be_loaded_again() -> None:
+    """Its classes are others then, of the same module and name; of classes made in functions nobody knows."""
+    first, again = (type("Mine", (Level,), {"__module__": "mine", "__qualname__": "Mine"}) for _ in range(2))
+    registry: Registry[object] = Registry("value encoder", {"mine": first})
+    registry.register("mine", again)
+    assert registry.find("mine") is again
+    local, other = (type("Mine", (Level,), {"__module__": "mine", "__qualname__": "make.<locals>.Mine"}) for _ in "ab")
+    registry.register("local", local)
+    with pytest.raises(ValueError, match="another value encoder 'local' already"):
+        registry.register("local", other)
 
 
 @pytest.mark.parametrize("name", ["", None, 3])

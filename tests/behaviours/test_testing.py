@@ -1,0 +1,316 @@
+"""The law suites that users run: they pass on sound rules and policies, and name the law that a broken one breaks."""
+
+import copy
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import pytest
+import torch
+from robots import space
+from torch import Tensor
+
+from behaviours import Behaviour, BehaviourBank, Demonstrations, ErrorDriven, LeastSquares, OneShot, Policy, Priority
+from behaviours.progress import Progress, silent
+from behaviours.recall import Recall
+from behaviours.space import Space
+from behaviours.testing import check_policy, check_rule
+from torchvsa import VSA
+
+
+class Miscounting(OneShot):
+    """Reports a sample too many."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        behaviour = super().fit(space, demonstrations, progress)
+        behaviour.report = replace(behaviour.report, samples=behaviour.report.samples + 1)
+        return behaviour
+
+
+class Random(OneShot):
+    """Adds noise from PyTorch's global generator."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        behaviour = super().fit(space, demonstrations, progress)
+        behaviour.program.add_(torch.randint_like(behaviour.program, 2))
+        return behaviour
+
+
+class Seeding(OneShot):
+    """Seeds PyTorch's global generator."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        torch.manual_seed(0)
+        return super().fit(space, demonstrations, progress)
+
+
+@dataclass(frozen=True)
+class Remembering(OneShot):
+    """Sums up all that it was ever shown."""
+
+    name = "remembering"
+    past: list[Tensor] = field(default_factory=list, repr=False)
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        behaviour = super().fit(space, demonstrations, progress)
+        self.past.append(behaviour.program.clone())
+        behaviour.program = torch.stack(self.past).sum(0, dtype=torch.int32)
+        return behaviour
+
+
+class Forgetful(OneShot):
+    """Learns the first half alone."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        half = torch.arange(len(demonstrations)) <= len(demonstrations) // 2
+        return super().fit(space, demonstrations.where(half), progress)
+
+
+class Greedy(OneShot):
+    """Writes into the demonstration."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        behaviour = super().fit(space, demonstrations, progress)
+        demonstrations.commands.neg_()
+        return behaviour
+
+
+class Hasty(OneShot):
+    """Never says that it is done."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        return super().fit(space, demonstrations, lambda share: progress(share / 2))
+
+
+class Overwriting(ErrorDriven):
+    """Goes on within the behaviour that it was given."""
+
+    def partial_fit(
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+    ) -> Behaviour:
+        after = super().partial_fit(behaviour, demonstrations, progress)
+        behaviour.program.copy_(after.program)
+        return after
+
+
+class Crashing(OneShot):
+    """Cannot go on, and says so in its own way."""
+
+    def partial_fit(
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+    ) -> Behaviour:
+        raise NotImplementedError("not today")
+
+
+class Undifferentiable(OneShot):
+    """Learns nothing where gradients are off."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        behaviour = super().fit(space, demonstrations, progress)
+        behaviour.program *= int(torch.is_grad_enabled())
+        return behaviour
+
+
+class Careless(OneShot):
+    """Takes rows in which nothing was observed, and leaves them out."""
+
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+        return super().fit(space, demonstrations.where(~demonstrations.sensors.isnan().all(1)), progress)
+
+
+class Unwilling(LeastSquares):
+    """Learns with an architecture that it says it does not support."""
+
+    @classmethod
+    def supports(cls, vsa: VSA) -> bool:
+        return False
+
+
+@pytest.mark.parametrize(
+    ("rule", "law"),
+    [
+        (Miscounting(), "the report adds up|a behaviour over the given space is learned"),
+        (Random(), "a behaviour over the given space is learned|the same again gives the same bits"),
+        (Seeding(), "the same again gives the same bits. AssertionError: PyTorch's global random numbers"),
+        (Remembering(), "a behaviour over the given space is learned|the same again gives the same bits"),
+        (Forgetful(), "unrelated pairs are recalled"),
+        (Greedy(), "demonstration space and rule stay as they are|unrelated pairs are recalled"),
+        (Hasty(), "progress rises to one"),
+        (Overwriting(), "pieces go on or are refused.*program of the behaviour before was changed"),
+        (Crashing(), "(progress rises to one|pieces go on or are refused). NotImplementedError: not today"),
+        (Undifferentiable(), "whether gradients are on does not matter"),
+        (Careless(), "demonstrations that are not valid are refused"),
+        (Unwilling(), "what it does not support is refused. AssertionError: no ValueError was raised"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, OneShot | ErrorDriven | LeastSquares) else "",
+)
+def test_a_broken_rule_is_told_its_law(rule: Any, law: str) -> None:
+    with pytest.raises(AssertionError, match=rf"{type(rule).__name__}\(.* breaks the law: ({law})"):
+        check_rule(rule)
+
+
+class Steady(Priority):
+    """The sound one: goes on with the first that ever spoke."""
+
+    def start(self, episodes: Any) -> Any:
+        return super().start(episodes), torch.full((len(episodes),), -1)
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        past, speaker = state
+        cells, past = self.space.step(readings, past)
+        blind = (cells < 0).all(-1)
+        recall = super().answer(cells)
+        assert recall.speaker is not None
+        speaker = torch.where((speaker < 0) & ~blind, recall.speaker, speaker)
+        answers = [part.answer(cells) for part in self.parts]
+        rows = torch.arange(len(cells))
+        commands, similarity, margin, familiarity = (
+            torch.stack([getattr(answer, name) for answer in answers])[speaker.clamp(min=0), rows]
+            for name in ("commands", "similarity", "margin", "familiarity")
+        )
+        return Recall(commands, similarity, margin, familiarity, speaker).blank(blind), (past, speaker)
+
+
+class Hiding(Priority):
+    """Keeps what it remembers to itself."""
+
+    count = 0
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        self.count += 1
+        recall, state = super().step(readings, state)
+        return recall._replace(similarity=recall.similarity / self.count), state
+
+
+class Writing(Steady):
+    """Writes into the state that it was given."""
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        recall, (past, speaker) = super().step(readings, state)
+        state[1].copy_(speaker)
+        return recall, (past, state[1])
+
+
+class Sociable(Steady):
+    """All robots of a batch follow the first."""
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        recall, (past, speaker) = super().step(readings, state)
+        return recall, (past, speaker[:1].expand(len(speaker)).clone())
+
+
+class Placed(Steady):
+    """Treats robots by their place in the batch."""
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        recall, state = super().step(readings, state)
+        places = 1 + torch.arange(len(recall.similarity))
+        return recall._replace(similarity=recall.similarity / places), state
+
+
+class Growing(Steady):
+    """Lets the state grow."""
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        recall, (past, speaker) = super().step(readings, state[:2])
+        return recall, (past, speaker, speaker)
+
+
+class Talking(Priority):
+    """Speaks where nothing was observed."""
+
+    def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
+        recall, state = super().step(readings, state)
+        return recall._replace(commands=recall.commands.nan_to_num(0.0)), state
+
+
+class Unnamed(Priority):
+    """Counts speakers from 1."""
+
+    def ask(self, conditions: Tensor) -> Recall:
+        recall = super().ask(conditions)
+        assert recall.speaker is not None
+        return recall._replace(speaker=recall.speaker + 1)
+
+
+class Live(Priority):
+    """Asks whatever its bank holds by now."""
+
+    def __init__(self, bank: BehaviourBank) -> None:
+        super().__init__(bank)
+        self.bank = bank
+
+    def ask(self, conditions: Tensor) -> Recall:
+        return Priority(self.bank).ask(conditions)
+
+
+class Loose(Priority):
+    """Holds programs that no state_dict carries."""
+
+    def __init__(self, bank: BehaviourBank) -> None:
+        super().__init__(bank)
+        self.others = [copy.deepcopy(Priority(bank))]
+
+    def ask(self, conditions: Tensor) -> Recall:
+        return self.others[0].ask(conditions)
+
+
+class Dark(Priority):
+    """Answers otherwise where gradients are off."""
+
+    def ask(self, conditions: Tensor) -> Recall:
+        recall = super().ask(conditions)
+        return recall if torch.is_grad_enabled() else recall._replace(similarity=recall.similarity * 0)
+
+
+class Endless(Priority):
+    """Gives commands beyond the range."""
+
+    def ask(self, conditions: Tensor) -> Recall:
+        recall = super().ask(conditions)
+        return recall._replace(commands=recall.commands * 10)
+
+
+def nobody(bank: BehaviourBank) -> Any:
+    return torch.nn.Identity()
+
+
+def unasking(bank: BehaviourBank) -> Policy:
+    """A policy of nothing."""
+    if bank.names:
+        return Priority(bank)
+    made = BehaviourBank(bank.space)
+    made.learn("x", Demonstrations([[1.0, 1, 1]], [[0.0, 0]]), OneShot())
+    return Priority(made)
+
+
+@pytest.mark.parametrize(
+    ("make", "law"),
+    [
+        (Hiding, "the same state gives the same answer"),
+        (Writing, "a step changes neither readings nor state"),
+        (Sociable, "robots do not influence each other"),
+        (Placed, "robots do not influence each other"),
+        (Growing, "the state has one row per robot and keeps its form"),
+        (Talking, "nothing observed nothing said"),
+        (Unnamed, "the speaker is one of its names"),
+        (Live, "a policy is a snapshot"),
+        (Loose, "a state dict carries what it answers by"),
+        (Dark, "whether gradients are on does not matter"),
+        (Endless, "answers have one row per robot within range"),
+        (nobody, "it is a policy of its bank"),
+        (unasking, "an empty bank has nothing to combine"),
+    ],
+)
+def test_a_broken_policy_is_told_its_law(make: Any, law: str) -> None:
+    with pytest.raises(AssertionError, match=rf"{make.__name__} breaks the law: ({law})"):
+        check_policy(make)
+
+
+def test_a_sound_policy_with_a_memory_passes() -> None:
+    check_policy(Steady)
+    check_policy(Steady, space(1000, "HRR", protection={"name": "self_shift", "width": "sum"}))
+
+
+def test_a_rule_is_an_object() -> None:
+    with pytest.raises(TypeError, match=r"write OneShot\(\)"):
+        check_rule(OneShot)  # type: ignore[arg-type]
