@@ -14,7 +14,7 @@ from torch import Tensor
 from behaviours.ordered import distinct_rows
 from behaviours.report import LearningReport
 from torchvsa import VSA
-from torchvsa.exact import is_integer, signed
+from torchvsa._numerics import as_bipolar, is_integer
 
 _LARGEST = 2**53
 
@@ -124,6 +124,6 @@ def weighted_sum(vsa: VSA, weights: Sequence[float], vectors: Sequence[Shaped[Te
 
 def stacked(vectors: Sequence[Shaped[Tensor, "d"]]) -> Shaped[Tensor, "b d"]:
     """Programs `[b, d]` in one type: raw and clipped ones (smaller types, bits that count as votes) may be mixed."""
-    votes = [signed(vector) for vector in vectors]
+    votes = [as_bipolar(vector) for vector in vectors]
     wide = reduce(torch.promote_types, (vote.dtype for vote in votes))
     return torch.stack([vote.to(wide) for vote in votes])

@@ -18,7 +18,7 @@ from behaviours.recall import Recall, asked_once
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from behaviours.storage import Layout, check_layout, load_tensors, naming, save_tensors
-from torchvsa.blocks import by_blocks
+from torchvsa._blocks import by_blocks
 
 
 class BehaviourBank(nn.Module):

@@ -19,8 +19,8 @@ from behaviours.schema import Actuator, Sensor
 from behaviours.space import Space
 from behaviours.storage import checksum
 from torchvsa import VSA, Readout, ShapeError
-from torchvsa.blocks import by_blocks
-from torchvsa.exact import is_integer, signed
+from torchvsa._blocks import by_blocks
+from torchvsa._numerics import as_bipolar, is_integer
 
 
 class Behaviour(Controller):
@@ -201,7 +201,7 @@ class Behaviour(Controller):
         It is a behaviour like any other: asked, copied, saved in a bank, exported. (A bank file holds its program as a
         tensor; what is loaded from one can be made trainable again.)
         """
-        program = signed(self.program).detach()
+        program = as_bipolar(self.program).detach()
         wide = torch.float32 if is_integer(program) else program.dtype
         parameter = nn.Parameter(program.to(wide, copy=True))
         return Behaviour(self.space, parameter, self.known.clone(), self.results.clone(), self.report)

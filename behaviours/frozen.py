@@ -15,9 +15,9 @@ from behaviours.controller import Controller
 from behaviours.recall import Recall, recalled
 from behaviours.space import Space
 from torchvsa import Readout
+from torchvsa._blocks import by_blocks
 from torchvsa._kernels.rows import Row, noise, real, row_encoder
-from torchvsa.blocks import by_blocks
-from torchvsa.exact import in_units, norms, real_parts, signed
+from torchvsa._numerics import as_bipolar, in_units, norms, real_parts
 
 
 class FrozenBehaviour(Controller):
@@ -91,7 +91,7 @@ class _Tick:
         self.width = self.high - self.low
         self.ends = self.low.tolist(), self.high.tolist()
         known, _ = in_units(frozen.known)
-        rows = [real_parts(signed(rows)).to(torch.float64) for rows in (readout.folded, known[None])]
+        rows = [real_parts(as_bipolar(rows)).to(torch.float64) for rows in (readout.folded, known[None])]
         # Products of integers are exact in float64, whatever the order of their sums.
         self.table = torch.cat(rows).numpy()
         self.lengths = torch.where(readout.lengths == 0, 1.0, readout.lengths).numpy()

@@ -4,7 +4,7 @@ import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
-from torchvsa.exact import real_parts
+from torchvsa._numerics import real_parts
 
 
 def first_rows(values: Int64[Tensor, "N"]) -> Int64[Tensor, "k"]:

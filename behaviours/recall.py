@@ -9,7 +9,7 @@ from torch import Tensor
 
 from behaviours.ordered import distinct_rows
 from torchvsa import Readout
-from torchvsa.exact import dots, in_units, norms, scaled
+from torchvsa._numerics import in_units, inner_products, norms, over_lengths
 
 
 class Recall(NamedTuple):
@@ -71,5 +71,5 @@ def recalled(
 def familiarity(conditions: Shaped[Tensor, "batch d"], known: Shaped[Tensor, "d"]) -> Float[Tensor, "batch"]:
     """The cosine of each condition with the sum of the known ones; 0 where one of them is a zero vector."""
     known, _ = in_units(known)
-    products = dots(conditions, known[None])[:, 0]
-    return scaled(products.to(torch.float64), norms(conditions) * norms(known)).to(torch.float32)
+    products = inner_products(conditions, known[None])[:, 0]
+    return over_lengths(products.to(torch.float64), norms(conditions) * norms(known)).to(torch.float32)

@@ -25,10 +25,14 @@ def whole_number(value: Any, what: str) -> int:
 _C = cast(Any, torch._C)
 
 
+def mapped(*tensors: Tensor) -> bool:
+    """Whether one of the tensors is one that `vmap` or another transform looks through."""
+    return not torch.compiler.is_compiling() and any(map(_C._functorch.is_functorch_wrapped_tensor, tensors))
+
+
 def _mapped_or_traced(x: Tensor) -> bool:
     """Whether a graph is being made, or the tensor is one that `vmap` or another transform looks through."""
-    tracing = torch.compiler.is_compiling() or _C._get_tracing_state() is not None
-    return tracing or _C._functorch.is_functorch_wrapped_tensor(x)
+    return torch.compiler.is_compiling() or _C._get_tracing_state() is not None or mapped(x)
 
 
 def readable(*tensors: Tensor) -> bool:

@@ -12,12 +12,12 @@ import torch
 from jaxtyping import Int, Shaped
 from torch import Tensor
 
+from torchvsa._blocks import by_blocks
 from torchvsa._checks import whole_number
 from torchvsa._memory_limit import require_memory
+from torchvsa._numerics import as_bipolar, inner_products, is_integer
 from torchvsa.architectures import VSA
-from torchvsa.blocks import by_blocks
 from torchvsa.errors import ShapeError
-from torchvsa.exact import dots, is_integer, signed
 from torchvsa.part import Layout, Part
 from torchvsa.registry import Registry
 
@@ -171,13 +171,18 @@ class SelfShift(Protection):
             marks = rows.clamp(0, 1).to(torch.int8)  # several times faster than comparing, and the same for integers
         else:
             marks = self.vsa.positive(rows).to(torch.int8)
-        return dots(marks, self.columns)
+        return inner_products(marks, self.columns)
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Superpose `x` with `h`, then shift by the width of `x`."""
         self.vsa.check(x, "x")
         self._require_drawn()
-        return self.vsa.bundle_two_and_permute(x, self.h.to(x.dtype), self.width(x))
+        # In blocks, rows stay in the cache between the steps.
+        rows = by_blocks(self._protected, x.reshape(-1, self.vsa.dim), row_bytes=4 * self.vsa.dim * x.element_size())
+        return rows.reshape(x.shape)
+
+    def _protected(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch d"]:
+        return self.vsa.permute(self.vsa._bundle_pair(rows, self.h.to(rows.dtype)), self.width(rows))
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""
@@ -193,7 +198,7 @@ class SelfShift(Protection):
         Exact for bipolar x in MAP-C and MAP-I (where the superposition is 0, x = -h), up to rounding in
         FHRR; an estimate, similar to x, for other x and in the other architectures.
         """
-        return self.vsa.separate(self.vsa.permute(y, -self.decode(y)), self.h.to(y.dtype))
+        return self.vsa.unbundle(self.vsa.permute(y, -self.decode(y)), self.h.to(y.dtype))
 
     def config(self) -> dict[str, Any]:
         """See `Part.config`; `h` itself is a tensor."""
@@ -209,7 +214,7 @@ def _places(dim: int) -> int:
 
 
 def _floats(x: Tensor) -> Tensor:
-    x = signed(x)
+    x = as_bipolar(x)
     return x.to(torch.float32) if is_integer(x) else x
 
 

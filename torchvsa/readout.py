@@ -6,9 +6,9 @@ import torch
 from jaxtyping import Float64, Shaped
 from torch import Tensor, nn
 
-from torchvsa.blocks import by_blocks
+from torchvsa._blocks import by_blocks
+from torchvsa._numerics import as_bipolar, in_units, inner_products, is_integer, norms, over_lengths
 from torchvsa.errors import ShapeError
-from torchvsa.exact import dots, in_units, is_integer, norms, scaled, signed
 from torchvsa.memory import Match, best
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ class Readout(nn.Module):
     `bind` is bilinear, programs are folded into the items, `<unbind(p, c), item> = <fold(p, item), c>`, so that a batch
     of conditions is one matrix product (see `VSA.fold`); elsewhere the steps are taken one after the other.
 
-    Products of integers are exact, as in `dots`: their scores depend neither on the batch nor on threads. Scores are
-    float64 and differentiable by programs and conditions.
+    Products of integers are exact: their scores depend neither on the batch nor on threads. Scores are float64 and
+    differentiable by programs and conditions.
 
     A readout holds what was folded; later changes of `programs` and `items` do not reach it. `of` makes one for other
     programs over the same items.
@@ -73,24 +73,24 @@ class Readout(nn.Module):
 
     def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
         """The score of each item for each condition."""
-        scores = scaled(self._products(conditions).to(torch.float64), self.lengths)
+        scores = over_lengths(self._products(conditions).to(torch.float64), self.lengths)
         return scores if self.units is None else scores * self.units.to(torch.float64)
 
     def match(self, conditions: Shaped[Tensor, "batch d"]) -> Match:
         """The item that resembles each noisy result most: `[B]` or `[B, b]`, see `CleanUp`."""
         if self.vsa.bilinear and is_integer(conditions):
             # Products and lengths are found in float64, in which a row need be written once only.
-            conditions = signed(conditions).to(torch.float64)
+            conditions = as_bipolar(conditions).to(torch.float64)
         products = self._products(conditions)
-        return best(scaled(products.to(torch.float64), self.lengths), self._noise(conditions))
+        return best(over_lengths(products.to(torch.float64), self.lengths), self._noise(conditions))
 
     def _products(self, conditions: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch *b K"]:
         self.vsa.check(conditions, "conditions")
         shape = *self.programs.shape[:-1], len(self.items)
         if self.folded is not None:
-            return dots(conditions, self.folded.flatten(0, -2)).unflatten(-1, shape)
+            return inner_products(conditions, self.folded.flatten(0, -2)).unflatten(-1, shape)
         row_bytes = self.programs.numel() * max(self.programs.element_size(), 4)
-        return by_blocks(lambda rows: dots(self._unbound(rows), self.items), conditions, row_bytes=row_bytes)
+        return by_blocks(lambda rows: inner_products(self._unbound(rows), self.items), conditions, row_bytes=row_bytes)
 
     def _noise(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b"]:
         """The length of each noisy result, `|unbind(program, condition)|`."""

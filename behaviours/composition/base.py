@@ -12,7 +12,7 @@ from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
 from behaviours.options import number
 from behaviours.recall import Recall
-from torchvsa.blocks import by_blocks
+from torchvsa._blocks import by_blocks
 
 
 class Policy(Controller):

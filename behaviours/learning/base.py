@@ -7,7 +7,7 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.progress import Progress, silent
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import signed
+from torchvsa._numerics import as_bipolar
 
 if TYPE_CHECKING:
     from behaviours.behaviour import Behaviour
@@ -55,6 +55,6 @@ class Rule(ABC):
 def grown(before: "Behaviour | None", piece: "Behaviour") -> "Behaviour":
     """`piece`, whose known conditions and report take in those of the behaviour `before` it."""
     if before is not None:
-        piece.known = piece.known + signed(before.known)
+        piece.known = piece.known + as_bipolar(before.known)
         piece.report = before.report.then(piece.report)
     return piece

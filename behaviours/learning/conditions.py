@@ -10,7 +10,7 @@ from torch import Tensor
 from behaviours.ordered import distinct_rows, first_rows
 from behaviours.progress import Progress, silent
 from behaviours.space import Space
-from torchvsa.exact import dots, real_parts
+from torchvsa._numerics import inner_products, real_parts
 
 HELD_BYTES = 2**27
 """Conditions that take no more are held as hypervectors."""
@@ -101,4 +101,4 @@ def _fingerprints(conditions: Shaped[Tensor, "some d"], seed: int) -> Int64[Tens
     content = (real + 0.0 if real.is_floating_point() else real).contiguous().view(torch.int8)
     generator = torch.Generator().manual_seed(seed)
     keys = torch.randint(-127, 128, (_PRINTS, content.shape[1]), dtype=torch.int8, generator=generator)
-    return dots(content, keys.to(content.device)).to(torch.int64)
+    return inner_products(content, keys.to(content.device)).to(torch.int64)

@@ -19,7 +19,7 @@ from behaviours.options import flag, number, store, whole
 from behaviours.progress import Progress, between, silent
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import is_integer, norms, signed
+from torchvsa._numerics import as_bipolar, is_integer, norms
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class ErrorDriven(Rule):
         pairs = _Pairs(space.vsa, samples.conditions, targets, space.items(samples.results), self.margin)
         start = torch.zeros(space.vsa.dim, dtype=space.vsa.accumulator, device=targets.device)
         if before is not None:
-            start = start + signed(before.program).detach()
+            start = start + as_bipolar(before.program).detach()
         trained = self._train(pairs, start, between(progress, _ENCODED, 1))
         progress(1.0)
         report = samples.report(

@@ -18,7 +18,7 @@ from behaviours.options import flag, number, store, whole
 from behaviours.progress import Progress, between, silent
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import signed
+from torchvsa._numerics import as_bipolar
 
 Loss = Literal["cross_entropy", "hinge", "squared"]
 Output = Literal["float", "bipolar", "int8"]
@@ -180,7 +180,7 @@ class _Training:
         self.complex = wide.is_complex
         zero = torch.zeros(vsa.dim, dtype=wide, device=items.device)
         self.readout = vsa.readout(zero, items)
-        program = zero if before is None else signed(before.program).detach().to(wide, copy=True)
+        program = zero if before is None else as_bipolar(before.program).detach().to(wide, copy=True)
         start = torch.view_as_real(program) if self.complex else program
         if rule.sparse:
             # Two equal roots make a program of 0; at exactly 0 they would have no gradient.

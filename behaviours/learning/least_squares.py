@@ -16,7 +16,7 @@ from behaviours.options import number, store
 from behaviours.progress import Progress, between, silent
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa.exact import is_integer, signed
+from torchvsa._numerics import as_bipolar, is_integer
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def solve(
         )
     # Sums of fewer than 2^24 products of -1 and +1 are exact in float32, and twice as fast.
     exact = is_integer(conditions) and is_integer(items)
-    c, r = (signed(x).to(torch.float32 if exact else torch.float64) for x in (conditions, items))
+    c, r = (as_bipolar(x).to(torch.float32 if exact else torch.float64) for x in (conditions, items))
     pairs = len(c) * len(r)
     weight = ridge * float((c.double() ** 2).sum(0) @ (r.double() ** 2).sum(0)) / pairs
     if pairs <= vsa.dim:

@@ -13,7 +13,7 @@ from behaviours.learning.samples import Samples
 from behaviours.ordered import distinct_rows
 from behaviours.progress import Progress, silent
 from behaviours.space import Space
-from torchvsa.exact import dots, is_integer, norms, real_parts, signed
+from torchvsa._numerics import as_bipolar, inner_products, is_integer, norms, real_parts
 
 _DISTINCT, _BLOCK = 512, 8192
 """Most distinct conditions that are held, and compared with each other, at once; and most samples of them."""
@@ -50,7 +50,7 @@ class Sums:
         """Start from what was learned before."""
         wide = torch.promote_types(program.dtype, known.dtype)
         state = torch.stack([program.detach().to(wide), known.to(wide)])
-        self.state = state if self.clip else signed(state)
+        self.state = state if self.clip else as_bipolar(state)
         self.empty = False
 
     @property
@@ -117,7 +117,7 @@ class Sums:
         self.empty = False
 
     def _add_clipped(self, pair: Shaped[Tensor, "2 d"]) -> None:
-        self.state = self.vsa.bundle(pair[None], 0) if self.empty else self.vsa.bundle_two(self.state, pair)
+        self.state = self.vsa.bundle(pair[None], 0) if self.empty else self.vsa._bundle_pair(self.state, pair)
         self.empty = False
 
     def _add_dissimilar(self, block: _Block, threshold: float) -> list[int]:
@@ -125,9 +125,9 @@ class Sums:
 
         While the sums are raw, what an addition does to the products of all others stands in their Gram matrix.
         """
-        gram = _numbers(dots(block.conditions, block.conditions))
-        products = _numbers(dots(block.conditions, self.state[1:]))[:, 0]
-        square = _numbers(dots(self.state[1:], self.state[1:])).item()
+        gram = _numbers(inner_products(block.conditions, block.conditions))
+        products = _numbers(inner_products(block.conditions, self.state[1:]))[:, 0]
+        square = _numbers(inner_products(self.state[1:], self.state[1:])).item()
         lengths = np.sqrt(gram.diagonal())
         condition, added, start = block.condition.cpu().numpy(), [], 0
         while start < len(block):
@@ -185,7 +185,7 @@ def _numbers(x: Tensor) -> NDArray[np.float64]:
 
 def _floats(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
     """Real vectors with the same products, in the smallest type that keeps those of integers exact."""
-    x = real_parts(signed(x))
+    x = real_parts(as_bipolar(x))
     if is_integer(x):
         # Codes of one byte are -1, 0 or +1: sums of 2^24 products are exact in float32.
         return x.to(torch.float32 if x.dtype == torch.int8 else torch.float64)

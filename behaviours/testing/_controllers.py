@@ -15,7 +15,7 @@ from behaviours.controller import Controller
 from behaviours.recall import Recall
 from behaviours.testing._material import bits, no_global_random_numbers, readings, recalled, tensors, unchanged, walk
 from behaviours.testing._states import check_rows, copied, form, join, rows_of, same_state
-from torchvsa.exact import is_integer
+from torchvsa._numerics import is_integer
 from torchvsa.testing._laws import refuses, require, same, seeded
 
 _STEPS, _ROBOTS = 8, 6

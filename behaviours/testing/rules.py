@@ -28,7 +28,7 @@ from behaviours.testing._material import (
     unchanged,
 )
 from behaviours.testing._trial import Trial, counted, rows, same_program
-from torchvsa.exact import is_integer
+from torchvsa._numerics import is_integer
 from torchvsa.testing._laws import check, refuses, require, same
 
 

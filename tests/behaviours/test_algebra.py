@@ -14,7 +14,7 @@ from torch.testing import assert_close
 
 from behaviours import Behaviour, BehaviourBank, Bundle, Demonstrations, ErrorDriven, LearningReport, OneShot
 from torchvsa import ARCHITECTURES
-from torchvsa.exact import signed
+from torchvsa._numerics import as_bipolar
 
 NAMES = ["seek", "avoid", "flee"]
 SHOWN = random_pairs(36)
@@ -41,7 +41,7 @@ def test_programs_and_known_conditions_are_weighted_sums(vsa: str) -> None:
     bank = learned(vsa, 200)
     both = bank["seek"] + 2 * bank["avoid"] - bank["flee"] / 4
     for name in ("program", "known"):
-        seek, avoid, flee = (signed(getattr(bank[part], name)) for part in NAMES)
+        seek, avoid, flee = (as_bipolar(getattr(bank[part], name)) for part in NAMES)
         wanted = seek + 2 * avoid - 0.25 * flee
         assert_close(getattr(both, name), wanted.to(getattr(both, name).dtype))
     conditions = bank.space.encode(bank.space.cells(READINGS[:4]))

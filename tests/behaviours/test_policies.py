@@ -13,7 +13,7 @@ from torch.testing import assert_close
 
 from behaviours import Behaviour, BehaviourBank, Bundle, Demonstrations, ErrorDriven, OneShot, Policy, Priority, Recall
 from torchvsa import ARCHITECTURES
-from torchvsa.exact import dots
+from torchvsa._numerics import inner_products
 
 NAMES = ["seek", "avoid", "cruise"]
 
@@ -68,7 +68,7 @@ def test_clipping_breaks_the_vote() -> None:
     items = bank.space.items(policy.behaviour.results)
 
     def votes(program: torch.Tensor) -> torch.Tensor:
-        return dots(bank.space.vsa.unbind(program, conditions), items).to(torch.int64)
+        return inner_products(bank.space.vsa.unbind(program, conditions), items).to(torch.int64)
 
     shares = sum(votes(bank[name].program) for name in NAMES)
     assert torch.equal(votes(policy.program), torch.as_tensor(shares))

@@ -6,7 +6,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from torchvsa.blocks import by_blocks
+from torchvsa._blocks import by_blocks
 
 ROWS = torch.arange(10)
 

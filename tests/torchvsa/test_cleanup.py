@@ -11,7 +11,7 @@ from torch.testing import assert_close
 
 import torchvsa
 from torchvsa import VSA, CleanUp, Match
-from torchvsa.exact import signed
+from torchvsa._numerics import as_bipolar
 
 bounded = settings(deadline=None, derandomize=True, max_examples=80)
 
@@ -58,7 +58,9 @@ def test_every_space_is_cleaned_up(vsa: VSA) -> None:
     queries = vsa.bundle(vsa.random(4, 5, 3, generator=generator))
     queries[0, 0] = vsa.bundle(torch.stack([items[7], items[20], items[7]]))
     match = CleanUp(items)(queries)
-    exact = [x.numpy().astype(np.complex128 if x.is_complex() else np.float64) for x in map(signed, (queries, items))]
+    exact = [
+        x.numpy().astype(np.complex128 if x.is_complex() else np.float64) for x in map(as_bipolar, (queries, items))
+    ]
     assert_matches(match, oracle(*exact))
     assert match.index[0, 0] == 7
     assert_close(match.similarity, vsa.similarity(queries, items[match.index]))
@@ -101,7 +103,7 @@ def test_batches_give_the_bits_of_singles() -> None:
 @pytest.mark.parametrize("dtype", [torch.int8, torch.float32, torch.bool])
 def test_equal_items_leave_no_margin_and_the_first_wins(dtype: torch.dtype) -> None:
     codes = torchvsa.BSC(100).random(3, generator=torch.Generator().manual_seed(0))
-    items = codes if dtype == torch.bool else signed(codes).to(dtype)
+    items = codes if dtype == torch.bool else as_bipolar(codes).to(dtype)
     match = CleanUp(items[[2, 0, 1, 0, 1]])(items)
     assert match.index.tolist() == [1, 2, 0]
     assert match.margin[:2].tolist() == [0, 0]

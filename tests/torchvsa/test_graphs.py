@@ -125,7 +125,7 @@ def test_mapped_is_stacked(name: str, dtype: str | None) -> None:
     def stacked(function: Callable[..., Tensor], *batches: Tensor) -> Tensor:
         return torch.stack([function(*one) for one in zip(*batches, strict=True)])
 
-    pairwise: list[Callable[..., Tensor]] = [vsa.bind, vsa.unbind, vsa.similarity, vsa.bundle_two]
+    pairwise: list[Callable[..., Tensor]] = [vsa.bind, vsa.unbind, vsa.similarity, vsa._bundle_pair]
     for function in pairwise:
         close(vmap(function)(a, b), stacked(function, a, b))
         close(vmap(function, (0, None))(a, b[0]), stacked(lambda x, f=function: f(x, b[0]), a))
@@ -178,7 +178,7 @@ def test_gradients_are_slopes(vsa: VSA) -> None:
     agrees(lambda x: weighed(vsa.unbind(x, b)), a)
     agrees(lambda x: weighed(vsa.unbind(b, x)), a)
     agrees(lambda x: weighed(vsa.bundle(torch.stack([x, b, c]))), a)
-    agrees(lambda x: weighed(vsa.bundle_two(x, b)), a)
+    agrees(lambda x: weighed(vsa._bundle_pair(x, b)), a)
     agrees(lambda x: weighed(vsa.permute(x, torch.tensor([3, -2]))), a)
     # Similarities are float32, so their differences are coarse.
     agrees(lambda x: vsa.similarity(x, b).double(), a, step=1e-3, tolerance=2e-3)

@@ -10,7 +10,7 @@ from torch import Tensor
 from torch.testing import assert_close
 
 from torchvsa import MAP, VSA, CleanUp, ShapeError
-from torchvsa.exact import norms
+from torchvsa._numerics import norms
 from torchvsa.testing import check_architecture
 
 THROWAWAY = [Turned(1000), Turned(1000, torch.float32), Hashed(1000), Hashed(1000, torch.float32)]

@@ -13,7 +13,7 @@ from torch.testing import assert_close
 
 import torchvsa
 from torchvsa import FHRR, HRR, MAP, CleanUp
-from torchvsa.exact import dots, norms, paired_dots
+from torchvsa._numerics import inner_products, norms, paired_products
 
 bounded = settings(deadline=None, derandomize=True, max_examples=60)
 SCALES = [1e-44, 1e-30, 1e-20, 1.0, 1e18, 1e20, 1e37]
@@ -150,8 +150,8 @@ def test_full_range_int8_is_exact_in_any_dimension(rows: int, count: int, d: int
     a, b = (torch.randint(-128, 128, (size, d), generator=generator, dtype=torch.int8) for size in (rows, count))
     a[0], b[0] = -128, -128
     wide_a, wide_b = a.numpy().astype(np.int64), b.numpy().astype(np.int64)
-    assert (dots(a, b).numpy() == wide_a @ wide_b.T).all()
-    assert paired_dots(a[0], b[0]).item() == 2**14 * d
+    assert (inner_products(a, b).numpy() == wide_a @ wide_b.T).all()
+    assert paired_products(a[0], b[0]).item() == 2**14 * d
     assert_close(norms(a).numpy(), np.sqrt((wide_a**2).sum(-1)), rtol=4e-16, atol=0)
     match = CleanUp(b)(a)
     assert match.index[0] == 0
@@ -172,9 +172,9 @@ def test_wide_integers_are_right_to_the_rounding_of_float64(
     a, b = vectors
     product = sum(x * y for x, y in zip(*exact, strict=True))
     size = sum(abs(x * y) for x, y in zip(*exact, strict=True))
-    for answer in (paired_dots(a, b), dots(a, b[None])[0]):
+    for answer in (paired_products(a, b), inner_products(a, b[None])[0]):
         assert abs(int(answer.double()) - product) <= 4 * d * 2.0**-53 * size
     length = math.sqrt(sum(x * x for x in exact[0]))
     assert norms(a).item() == pytest.approx(length, rel=1e-15 if not a.is_floating_point() else 1e-6)
     if size < 2**53:
-        assert int(paired_dots(a, b)) == product
+        assert int(paired_products(a, b)) == product

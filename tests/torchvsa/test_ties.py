@@ -7,7 +7,7 @@ from torch import Tensor
 
 import torchvsa
 from torchvsa import VSA
-from torchvsa.exact import signed
+from torchvsa._numerics import as_bipolar
 
 DIM = 1000
 MAJORITY = {
@@ -23,7 +23,7 @@ def majority(request: pytest.FixtureRequest) -> VSA:
 
 
 def votes(xs: Tensor) -> np.ndarray:
-    return signed(xs).to(torch.int64).numpy()
+    return as_bipolar(xs).to(torch.int64).numpy()
 
 
 @pytest.mark.parametrize("k", [1, 2, 3, 4, 9, 10])

@@ -110,10 +110,10 @@ def test_two_accumulators_are_bundled_exactly_or_refused() -> None:
     most = torch.full((4,), 2**31 - 1, dtype=torch.int32)
     for variant in ("C", "B", "I"):
         with pytest.raises(ValueError, match="limit of int32"):
-            MAP(4, variant, torch.int8).bundle_two(most, most)
+            MAP(4, variant, torch.int8)._bundle_pair(most, most)
     clipping = MAP(4, dtype=torch.int8)
-    assert clipping.bundle_two(most, -most).tolist() == [0] * 4
-    assert clipping.bundle_two(most - 1, torch.ones(4, dtype=torch.int8)).tolist() == [1] * 4
+    assert clipping._bundle_pair(most, -most).tolist() == [0] * 4
+    assert clipping._bundle_pair(most - 1, torch.ones(4, dtype=torch.int8)).tolist() == [1] * 4
 
 
 def test_accumulators_in_int64_are_narrowed_or_refused() -> None:
@@ -157,7 +157,7 @@ def test_a_space_of_floats_sums_integers_as_floats() -> None:
 def test_bits_and_votes_in_one_list_count_as_votes() -> None:
     bits, votes = torch.tensor([False, True, False, True]), torch.tensor([-5, 5, 5, -5], dtype=torch.int32)
     assert BSC(4).superpose([bits, votes]).tolist() == [-4, 4, 6, -6]
-    assert BSC(4).bundle_two(votes, bits).tolist() == [True, False, False, True]
+    assert BSC(4)._bundle_pair(votes, bits).tolist() == [True, False, False, True]
 
 
 def test_what_cannot_be_bundled_is_named_in_one_line() -> None:

@@ -10,13 +10,13 @@ import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
+from torchvsa._blocks import by_blocks
 from torchvsa._checks import INTEGERS, whole_number
+from torchvsa._kernels.rotation import roll_rows
 from torchvsa._memory_limit import require_memory
-from torchvsa.architectures.sums import check_weights, integer_sum, stacked, weighted
-from torchvsa.blocks import by_blocks
+from torchvsa._numerics import as_bipolar, cosines, is_integer, norms
+from torchvsa.architectures._sums import check_weights, integer_sum, stacked, weighted
 from torchvsa.errors import ShapeError
-from torchvsa.exact import cosines, is_integer, norms, signed
-from torchvsa.operators import entries, rotated
 from torchvsa.readout import Readout
 
 Summands = Shaped[Tensor, "..."] | Sequence[Shaped[Tensor, "..."]]
@@ -154,16 +154,18 @@ class VSA(ABC):
             raise ValueError(f"shifts are a whole number or a tensor of integers; got a tensor of {shifts.dtype}")
         return self._permuted(x, shifts)
 
-    def _permuted(
-        self, x: Shaped[Tensor, "*#batch d"], shifts: Int[Tensor, "*#batch"], added: Shaped[Tensor, "d"] | None = None
-    ) -> Shaped[Tensor, "*#batch d"]:
-        """`permute` with a tensor of shifts; for `added` see `rotated`."""
+    def _permuted(self, x: Shaped[Tensor, "*#batch d"], shifts: Int[Tensor, "*#batch"]) -> Shaped[Tensor, "*#batch d"]:
+        """`permute` with a tensor of shifts."""
         if shifts.shape != x.shape[:-1]:
             batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
             x, shifts = x.expand(*batch, self.dim), shifts.expand(batch)
         # Small types cannot hold every shift up to d, nor any type the negative of its lowest number.
         starts = (-shifts.to(torch.int64).remainder(self.dim)).remainder(self.dim)
-        return rotated(x.reshape(-1, self.dim), starts.reshape(-1), added).reshape(x.shape)
+        # Rows are written twice on the way.
+        rows = by_blocks(
+            roll_rows, x.reshape(-1, self.dim), starts.reshape(-1), row_bytes=4 * self.dim * x.element_size()
+        )
+        return rows.reshape(x.shape)
 
     def superpose(
         self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
@@ -192,7 +194,7 @@ class VSA(ABC):
                 f"bundling sums over one dimension beside the hypervectors' own; got shape {tuple(xs.shape)} and "
                 f"dim={dim}, expected e.g. [..., k, {self.dim}] and dim=-2"
             )
-        votes = signed(xs)
+        votes = as_bipolar(xs)
         if weights is not None:
             check_weights(weights, votes, xs.shape[dim])
         if is_integer(votes) and not self.integer:
@@ -211,19 +213,21 @@ class VSA(ABC):
         """
         return self.normalize(self.superpose(xs, dim, weights))
 
-    def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
+    def _bundle_pair(
+        self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
         """`bundle` of `a` and `b`, element by element of the (broadcast) batch."""
         return self.bundle([a, b])
 
-    def bundle_entries(
+    def _bundle_entries(
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
     ) -> Shaped[Tensor, "batch d"]:
         """`bundle` of the hypervectors `table[i, places[:, i]]`, where it needs only their sum (see `breaks_ties`)."""
         wide = self._type_of_sums(len(table))
 
         def bundled(rows: Tensor) -> Tensor:
-            vectors = entries(table, rows)
-            return self.normalize(reduce(Tensor.add_, vectors, next(vectors).to(wide)))
+            first, *others = entries(table, rows)
+            return self.normalize(reduce(Tensor.add_, others, first.to(wide)))
 
         return by_blocks(bundled, places, row_bytes=self.dim * (wide.itemsize + self.dtype.itemsize))
 
@@ -231,17 +235,11 @@ class VSA(ABC):
         """The smallest type that holds sums of so many hypervectors, which is the fastest to add."""
         return self.dtype if count < 128 else self.accumulator  # integer codes are -1, 0 and +1
 
-    def bind_entries(
+    def _bind_entries(
         self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
     ) -> Shaped[Tensor, "batch d"]:
         """The hypervectors `table[i, places[:, i]]`, bound one after the other."""
         return by_blocks(lambda rows: reduce(self.bind, entries(table, rows)), places, row_bytes=2 * self.row_bytes)
-
-    def bundle_two_and_permute(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]
-    ) -> Shaped[Tensor, "*batch d"]:
-        """`permute(bundle_two(a, b), shifts)`, for those who can do both in one go."""
-        return self.permute(self.bundle_two(a, b), shifts)
 
     def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
         """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything.
@@ -254,9 +252,9 @@ class VSA(ABC):
 
     def positive(self, x: Shaped[Tensor, "*batch d"]) -> Bool[Tensor, "*batch d"]:
         """The elements that count as > 0, from which a self-derived shift takes its width."""
-        return (x.real if x.is_complex() else signed(x)) > 0
+        return (x.real if x.is_complex() else as_bipolar(x)) > 0
 
-    def separate(
+    def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate `x` from `bundle([x, known])`, given `known`."""
@@ -306,3 +304,8 @@ class VSA(ABC):
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
         """Whether the elements are such as a hypervector can have."""
         return bool(x.isfinite().all())
+
+
+def entries(table: Shaped[Tensor, "n entries d"], places: Int[Tensor, "batch n"]) -> list[Shaped[Tensor, "batch d"]]:
+    """`table[i, places[:, i]]` for each i; copied row by row, far faster than by plain indexing."""
+    return [rows.index_select(0, column) for rows, column in zip(table, places.unbind(1), strict=True)]

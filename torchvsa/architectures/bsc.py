@@ -1,16 +1,15 @@
 """Binary Spatter Codes."""
 
 import torch
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa._checks import refuse_nan
+from torchvsa._numerics import as_bipolar, norms
+from torchvsa.architectures._random import random_bits
+from torchvsa.architectures._sums import multiplied, stacked
+from torchvsa.architectures._ties import first_two
 from torchvsa.architectures.base import VSA, Summands
-from torchvsa.architectures.draw import random_bits
-from torchvsa.architectures.sums import multiplied, stacked
-from torchvsa.architectures.ties import first_two
-from torchvsa.exact import norms, signed
-from torchvsa.operators import looked_up
 
 
 class BSC(VSA):
@@ -50,13 +49,7 @@ class BSC(VSA):
         self.check(b, "b")
         if a.dtype == torch.bool and b.dtype == torch.bool:
             return a ^ b
-        return multiplied(signed(a), signed(b))
-
-    def bind_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """See `VSA.bind_entries`."""
-        return looked_up(table, places, "exclusive or")
+        return multiplied(as_bipolar(a), as_bipolar(b))
 
     def unbind(
         self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
@@ -85,7 +78,7 @@ class BSC(VSA):
     def _majority(raw: Tensor, tie: Tensor) -> Tensor:
         return (raw < 0) | ((raw == 0) & tie)
 
-    def separate(
+    def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
         """Where the bundle differs from `known`, x does too; elsewhere x is taken to agree."""

@@ -6,8 +6,8 @@ import torch
 from jaxtyping import Float, Shaped
 from torch import Tensor
 
+from torchvsa._numerics import safe_divide, safe_sqrt, units
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide, root, units
 
 
 class FHRR(VSA):
@@ -56,7 +56,7 @@ class FHRR(VSA):
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Scale every element to length 1; zero stays zero."""
-        return divide(raw, raw.abs())
+        return safe_divide(raw, raw.abs())
 
     @property
     def frequencies(self) -> int:
@@ -70,7 +70,7 @@ class FHRR(VSA):
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
         return bool(((x.abs() - 1).abs() < 1e-3).all())
 
-    def separate(
+    def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
         """The angle of a sum of two lies midway, so x is `known` mirrored at the bundle."""
@@ -79,4 +79,4 @@ class FHRR(VSA):
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `|key|² · |program|²`: one product for the whole batch."""
         unit = units(program)
-        return root(keys.abs() ** 2 @ ((program.abs() / unit) ** 2)) * unit.to(torch.float64)
+        return safe_sqrt(keys.abs() ** 2 @ ((program.abs() / unit) ** 2)) * unit.to(torch.float64)

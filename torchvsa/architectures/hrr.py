@@ -4,8 +4,8 @@ import torch
 from jaxtyping import Float, Shaped
 from torch import Tensor
 
+from torchvsa._numerics import in_range, safe_divide
 from torchvsa.architectures.base import VSA
-from torchvsa.exact import divide, in_range
 
 
 class HRR(VSA):
@@ -64,7 +64,7 @@ class HRR(VSA):
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Scale to length 1; zero stays zero."""
         rows, lengths, _ = in_range(raw)
-        return divide(rows, lengths[..., None].to(rows.dtype))
+        return safe_divide(rows, lengths[..., None].to(rows.dtype))
 
     @property
     def frequencies(self) -> int:
@@ -84,7 +84,7 @@ class HRR(VSA):
         # Ten standard deviations: no element of a drawn hypervector is ever so far from 0.
         return bool((x.abs() <= 10 / self.dim**0.5).all())
 
-    def separate(
+    def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate x from the bundle: two near-orthogonal vectors of length 1 have a sum of length √2."""

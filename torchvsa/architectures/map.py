@@ -3,16 +3,15 @@
 from typing import Literal
 
 import torch
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa._checks import narrowed, refuse_nan
+from torchvsa._numerics import inner_products, is_integer, safe_sqrt, units, widened
+from torchvsa.architectures._random import random_bits
+from torchvsa.architectures._sums import multiplied, stacked
+from torchvsa.architectures._ties import first_two
 from torchvsa.architectures.base import VSA, Summands
-from torchvsa.architectures.draw import random_bits
-from torchvsa.architectures.sums import multiplied, stacked
-from torchvsa.architectures.ties import first_two
-from torchvsa.exact import dots, is_integer, root, units, widened
-from torchvsa.operators import looked_up
 
 
 class MAP(VSA):
@@ -26,8 +25,8 @@ class MAP(VSA):
 
     `dtype=torch.float32` is differentiable; `torch.int8` holds integer codes, exact and smallest, whose sums
     accumulate in int32. Codes in int8 must be -1, 0 or +1, which no verb checks: others may wrap around in `bind`,
-    `bundle_two`, records and protections. `superpose`, `bundle` and `similarity` are right for any int8 numbers, as is
-    every verb for accumulators in int32.
+    records and protections. `superpose`, `bundle` and `similarity` are right for any int8 numbers, as is every verb for
+    accumulators in int32.
 
     Source: Gayler 1998; Neubert et al. 2016, section II (variant C).
     """
@@ -122,35 +121,15 @@ class MAP(VSA):
             return self._signs(raw, self.permute(self.bind(*voters), 1))
         return self.normalize(raw)
 
-    def bundle_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """See `VSA.bundle_entries`."""
-        if self.variant != "C" or table.dtype != self._type_of_sums(len(table)):
-            return super().bundle_entries(table, places)
-        return looked_up(table, places, "clipped sum")
-
-    def bind_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """See `VSA.bind_entries`."""
-        return looked_up(table, places, "product")
-
-    def bundle_two(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """See `VSA.bundle_two`."""
+    def _bundle_pair(
+        self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]
+    ) -> Shaped[Tensor, "*#batch d"]:
+        """See `VSA._bundle_pair`."""
         whole = is_integer(a) or is_integer(b)
         if self.variant != "C" or (whole and not a.dtype == b.dtype == torch.int8):
-            return super().bundle_two(a, b)
+            return super()._bundle_pair(a, b)
         # Two elements of [-1, 1] add up within the codes' own type.
         return self.normalize(a + b)
-
-    def bundle_two_and_permute(
-        self, a: Shaped[Tensor, "*batch d"], b: Shaped[Tensor, "d"], shifts: Int[Tensor, "*batch"]
-    ) -> Shaped[Tensor, "*batch d"]:
-        """See `VSA.bundle_two_and_permute`."""
-        if self.variant != "C" or not self.dtype == a.dtype == b.dtype == torch.int8:
-            return super().bundle_two_and_permute(a, b, shifts)
-        return self._permuted(a, shifts, b)
 
     def _signs(self, raw: Tensor, tie: Tensor) -> Tensor:
         if tie.dtype != self.dtype:
@@ -167,7 +146,7 @@ class MAP(VSA):
             else raw.to(self.accumulator)
         )
 
-    def separate(
+    def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate `x` from `bundle([x, known])`.
@@ -184,8 +163,8 @@ class MAP(VSA):
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
         """The root of `key² · program²`: one product for the whole batch."""
         if is_integer(program):
-            return root(dots(keys.to(torch.float64) ** 2, program.to(torch.float64)[None] ** 2)[..., 0])
+            return safe_sqrt(inner_products(keys.to(torch.float64) ** 2, program.to(torch.float64)[None] ** 2)[..., 0])
         program = widened(program)
         unit = units(program)
-        squares = dots(keys.to(program.dtype) ** 2, (program / unit)[None] ** 2)[..., 0]
-        return root(squares) * unit.to(torch.float64)
+        squares = inner_products(keys.to(program.dtype) ** 2, (program / unit)[None] ** 2)[..., 0]
+        return safe_sqrt(squares) * unit.to(torch.float64)

@@ -8,8 +8,8 @@ import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor
 
+from torchvsa._blocks import by_blocks
 from torchvsa.architectures import VSA
-from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Encoder, planned
 from torchvsa.encoders.registry import encoder
 from torchvsa.part import Layout

@@ -57,7 +57,7 @@ class Product(Record):
         return self.vsa.identity().to(like)
 
     def _join(self, table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        return self.vsa.bind_entries(table, places(table, cells))
+        return self.vsa._bind_entries(table, places(table, cells))
 
     def _combine(
         self, bound: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]

@@ -8,9 +8,9 @@ import torch
 from jaxtyping import Bool, Float, Int64, Shaped
 from torch import Tensor, nn
 
+from torchvsa._blocks import by_blocks
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
-from torchvsa.blocks import by_blocks
 from torchvsa.encoders.base import Binned, Encoder, ValueEncoder, planned, whole
 from torchvsa.encoders.registry import value_encoder
 from torchvsa.part import Layout, Part

@@ -4,7 +4,7 @@ import torch
 from jaxtyping import Bool, Int64, Shaped
 from torch import Tensor
 
-from torchvsa.blocks import by_blocks
+from torchvsa._blocks import by_blocks
 from torchvsa.encoders.record import Record, places
 
 
@@ -22,7 +22,7 @@ class Sum(Record):
 
     def _join(self, table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         if not self.vsa.breaks_ties:
-            return self.vsa.bundle_entries(table, places(table, cells))
+            return self.vsa._bundle_entries(table, places(table, cells))
         # The voters themselves decide ties, so they are needed side by side.
         sensors = torch.arange(len(table), device=table.device)
         return by_blocks(

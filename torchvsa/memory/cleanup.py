@@ -7,10 +7,10 @@ import torch
 from jaxtyping import Float, Int, Shaped
 from torch import Tensor, nn
 
+from torchvsa._blocks import by_blocks
 from torchvsa._checks import readable
-from torchvsa.blocks import by_blocks
+from torchvsa._numerics import in_range, inner_products, norms, ordinary, over_lengths, units, widened
 from torchvsa.errors import ShapeError
-from torchvsa.exact import dots, in_range, norms, ordinary, scaled, units, widened
 
 _PRODUCT_BYTES = 2**27
 """Products held at once; more queries are answered some at a time."""
@@ -91,7 +91,7 @@ def _best(rows: Shaped[Tensor, "batch d"], items: Shaped[Tensor, "k d"], lengths
     rows, own = _measured(rows)
     # The products of many rows are found fastest together, and looked through while in the cache.
     work = partial(_look_through, items=lengths)
-    return by_blocks(work, dots(rows, items), own, row_bytes=24 * len(items))
+    return by_blocks(work, inner_products(rows, items), own, row_bytes=24 * len(items))
 
 
 def _measured(rows: Shaped[Tensor, "batch d"]) -> tuple[Shaped[Tensor, "batch d"], Float[Tensor, "batch"]]:
@@ -110,4 +110,4 @@ def _measured(rows: Shaped[Tensor, "batch d"]) -> tuple[Shaped[Tensor, "batch d"
 
 
 def _look_through(products: Shaped[Tensor, "batch k"], own: Float[Tensor, "batch"], items: Float[Tensor, "k"]) -> Match:
-    return best(scaled(products, items), own)
+    return best(over_lengths(products, items), own)

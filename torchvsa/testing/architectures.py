@@ -6,9 +6,9 @@ import torch
 from torch import Tensor
 from torch.testing import assert_close
 
+from torchvsa._numerics import norms
 from torchvsa.architectures import ARCHITECTURES, VSA, architecture
 from torchvsa.errors import ShapeError
-from torchvsa.exact import norms
 from torchvsa.testing._laws import check, refuses, require, same, seeded
 
 
@@ -128,7 +128,7 @@ def _a_bundle_does_not_depend_on_order(vsa: VSA) -> None:
 def _two_are_bundled_as_any_number_is(vsa: VSA) -> None:
     a, b = _draw(vsa, 4, 3), _draw(vsa, 3)
     for x, y in ((a, b), (a[0], a[1]), (vsa.bundle(a, 0), b)):
-        same(vsa.bundle_two(x, y), vsa.bundle(torch.stack(torch.broadcast_tensors(x, y.to(x.dtype)), -2)))
+        same(vsa._bundle_pair(x, y), vsa.bundle(torch.stack(torch.broadcast_tensors(x, y.to(x.dtype)), -2)))
 
 
 def _bundle_sums_over_any_dimension(vsa: VSA) -> None:

@@ -22,8 +22,8 @@ from behaviours import (
 from behaviours.learning.samples import Samples
 from behaviours.progress import Progress, between, silent
 from torchvsa import ARCHITECTURES, VSA
+from torchvsa._numerics import norms
 from torchvsa.encoders import VALUE_ENCODERS, ValueEncoder
-from torchvsa.exact import norms
 
 
 class SignedProduct(VSA):

@@ -8,8 +8,8 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from torchvsa._checks import INT32_MAX, INTEGERS, fits, largest, narrowed, readable, type_bound, whole_number
+from torchvsa._numerics import as_bipolar, is_integer
 from torchvsa.errors import ShapeError
-from torchvsa.exact import is_integer, signed
 
 
 def stacked(xs: Any, dim: Any) -> tuple[Shaped[Tensor, "..."], int]:
@@ -20,7 +20,7 @@ def stacked(xs: Any, dim: Any) -> tuple[Shaped[Tensor, "..."], int]:
         if not xs or not all(isinstance(x, Tensor) for x in xs):
             raise ValueError("a list of hypervectors to bundle must hold at least one tensor, and nothing else")
         if len({x.dtype for x in xs}) > 1:
-            xs = [signed(x) for x in xs]  # bits beside accumulators of votes are votes
+            xs = [as_bipolar(x) for x in xs]  # bits beside accumulators of votes are votes
         try:
             xs = torch.stack(torch.broadcast_tensors(*xs), -2)
         except RuntimeError:

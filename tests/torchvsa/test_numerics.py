@@ -11,15 +11,15 @@ from hypothesis.extra import numpy as hnp
 from torch import Tensor
 from torch.testing import assert_close
 
-from torchvsa.exact import divide, dots, norms, paired_dots, root, signed
-from torchvsa.operators.matrix import by_whole_tiles
+from torchvsa._kernels.integer_products import by_whole_tiles
+from torchvsa._numerics import as_bipolar, inner_products, norms, paired_products, safe_divide, safe_sqrt
 
 bounded = settings(deadline=None, derandomize=True, max_examples=60)
 INTEGERS = [torch.int8, torch.int16, torch.int32, torch.int64]
 
 
 def wide(x: Tensor) -> np.ndarray:
-    return signed(x).to(torch.int64).numpy()
+    return as_bipolar(x).to(torch.int64).numpy()
 
 
 @bounded
@@ -28,8 +28,8 @@ def test_integer_products_are_exact(data: st.DataObject, a: torch.dtype, b: torc
     codes = st.integers(-128, 127)
     x = torch.from_numpy(data.draw(hnp.arrays(np.int64, (2, 3, d), elements=codes))).to(a)
     y = torch.from_numpy(data.draw(hnp.arrays(np.int64, (5, d), elements=codes))).to(b)
-    assert (dots(x, y).numpy() == wide(x) @ wide(y).T).all()
-    assert (paired_dots(x, y[:3]).numpy() == (wide(x) * wide(y[:3])).sum(-1)).all()
+    assert (inner_products(x, y).numpy() == wide(x) @ wide(y).T).all()
+    assert (paired_products(x, y[:3]).numpy() == (wide(x) * wide(y[:3])).sum(-1)).all()
     # PyTorch's vectorised root may err in the last bit.
     assert_close(norms(x).numpy(), np.sqrt((wide(x) ** 2).sum(-1)), rtol=4e-16, atol=0)
 
@@ -51,24 +51,24 @@ def test_bits_count_as_votes(shape: tuple[int, ...]) -> None:
     generator = torch.Generator().manual_seed(0)
     x = torch.randint(2, shape, generator=generator, dtype=torch.uint8).bool()
     items = torch.randint(2, (6, 40), generator=generator, dtype=torch.uint8).bool()
-    assert signed(torch.tensor([False, True])).tolist() == [1, -1]
-    assert (dots(x, items).numpy() == wide(x) @ wide(items).T).all()
+    assert as_bipolar(torch.tensor([False, True])).tolist() == [1, -1]
+    assert (inner_products(x, items).numpy() == wide(x) @ wide(items).T).all()
     votes = torch.randint(-9, 9, shape, generator=generator, dtype=torch.int32)
-    assert (dots(votes, items).numpy() == wide(votes) @ wide(items).T).all()
+    assert (inner_products(votes, items).numpy() == wide(votes) @ wide(items).T).all()
 
 
 def test_large_integers_do_not_overflow() -> None:
     codes = torch.full((1, 100_000), -128, dtype=torch.int8)
     votes = torch.full((1, 4000), 2_000_000_000, dtype=torch.int32)
-    assert dots(codes, codes).item() == 128**2 * 100_000
-    assert paired_dots(codes, codes).item() == 128**2 * 100_000
-    assert dots(votes, codes[:, :4000]).item() == -128 * 2_000_000_000 * 4000
-    assert paired_dots(votes, codes[:, :4000]).item() == -128 * 2_000_000_000 * 4000
+    assert inner_products(codes, codes).item() == 128**2 * 100_000
+    assert paired_products(codes, codes).item() == 128**2 * 100_000
+    assert inner_products(votes, codes[:, :4000]).item() == -128 * 2_000_000_000 * 4000
+    assert paired_products(votes, codes[:, :4000]).item() == -128 * 2_000_000_000 * 4000
 
 
 def test_strides_do_not_matter() -> None:
     x = torch.randint(-1, 2, (40, 6), generator=torch.Generator().manual_seed(0), dtype=torch.int8).T
-    assert (dots(x, x[::2]).numpy() == wide(x) @ wide(x[::2]).T).all()
+    assert (inner_products(x, x[::2]).numpy() == wide(x) @ wide(x[::2]).T).all()
 
 
 @pytest.mark.parametrize("conjugated", [False, True])
@@ -78,13 +78,13 @@ def test_complex_products_are_hermitian_and_real(dtype: torch.dtype, conjugated:
     x = x.conj() if conjugated else x
     y = y.to(torch.complex64)
     expected = torch.from_numpy(np.real(x.resolve_conj().numpy() @ y.numpy().conj().T))
-    assert_close(dots(x, y).double(), expected.double(), atol=1e-4, rtol=0)
-    assert_close(paired_dots(x, y).double(), expected.diagonal().double(), atol=1e-4, rtol=0)
+    assert_close(inner_products(x, y).double(), expected.double(), atol=1e-4, rtol=0)
+    assert_close(paired_products(x, y).double(), expected.diagonal().double(), atol=1e-4, rtol=0)
 
 
 def test_division_by_no_length_is_zero() -> None:
     lengths = torch.tensor([2.0, 0.0], requires_grad=True)
-    quotient = divide(torch.tensor([3.0, 4.0]), lengths)
+    quotient = safe_divide(torch.tensor([3.0, 4.0]), lengths)
     assert quotient.tolist() == [1.5, 0]
     (gradient,) = torch.autograd.grad(quotient.sum(), lengths)
     assert gradient.tolist() == [-0.75, 0]
@@ -92,6 +92,6 @@ def test_division_by_no_length_is_zero() -> None:
 
 def test_the_root_has_a_gradient_at_zero() -> None:
     squares = torch.tensor([4.0, 0.0], requires_grad=True)
-    assert root(squares).tolist() == [2, 0]
-    (gradient,) = torch.autograd.grad(root(squares).sum(), squares)
+    assert safe_sqrt(squares).tolist() == [2, 0]
+    (gradient,) = torch.autograd.grad(safe_sqrt(squares).sum(), squares)
     assert gradient.tolist() == [0.25, 0]

@@ -6,18 +6,16 @@ for that at the lengths, while in graphs and on other devices, where a look woul
 are. The results are the same.
 """
 
-from functools import reduce
-
 import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
+from torchvsa._blocks import by_blocks
 from torchvsa._checks import readable, type_bound
-from torchvsa.blocks import by_blocks
-from torchvsa.operators import integer_product
+from torchvsa._kernels.integer_products import integer_products
 
 
-def signed(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
+def as_bipolar(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
     """Bits as votes (False: +1, True: -1, so that XOR is a product); any other tensor as it is."""
     return 1 - 2 * x.to(torch.int8) if x.dtype == torch.bool else x
 
@@ -34,11 +32,9 @@ def real_parts(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
 
 _FEW = 16
 """Rows up to which it does not pay to square them in a type of their own."""
-_INT8_TERMS = 2**17 - 32
-"""Products of two int8 numbers, at most 2^14 each, whose sum fits int32; a multiple of a GPU's tiles."""
 
 
-def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
+def inner_products(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
     """The inner product of each query with each item.
 
     Integers: int8 by int8 is exact, in int32, or in int64 from d = 131,041 on; anything wider is summed in float64,
@@ -47,15 +43,13 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     Floats: in the wider of both types, at least float32.
     Complex: the real part of the Hermitian product.
     """
-    a, b = signed(queries), signed(items)
+    a, b = as_bipolar(queries), as_bipolar(items)
     if a.is_complex() or b.is_complex():
         # Re<a, b> as one real product over interleaved parts: half the work of a complex product.
         wide = torch.promote_types(a.dtype, b.dtype)
         return real_parts(a.to(wide)) @ real_parts(b.to(wide)).T
-    int8 = a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting()
-    if int8 and (a.device.type == "cuda" or (a.device.type == "cpu" and a.shape[-1] > 1)):
-        # Units for int8; those of a CPU answer nonsense where d = 1.
-        return _int8_dots(a.reshape(-1, a.shape[-1]), b).reshape(*a.shape[:-1], len(b))
+    if a.dtype == torch.int8 and b.dtype == torch.int8 and not torch.compiler.is_exporting():
+        return integer_products(a.reshape(-1, a.shape[-1]), b).reshape(*a.shape[:-1], len(b))
     wide = torch.promote_types(torch.promote_types(a.dtype, b.dtype), torch.float32)
     if is_integer(a) and is_integer(b):
         wide = torch.float64
@@ -64,16 +58,7 @@ def dots(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> S
     return a.to(wide) @ b.to(wide).T
 
 
-def _int8_dots(a: Shaped[Tensor, "rows d"], b: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "rows k"]:
-    if a.shape[1] <= _INT8_TERMS:
-        return integer_product(a, b)
-    parts = zip(a.split(_INT8_TERMS, 1), b.split(_INT8_TERMS, 1), strict=True)
-    # A last part of one element would meet the units of a CPU where they answer nonsense.
-    sums = (integer_product(x, y) if x.shape[1] > 1 else x.to(torch.int32) * y.T.to(torch.int32) for x, y in parts)
-    return reduce(Tensor.add_, sums, torch.zeros(len(a), len(b), dtype=torch.int64, device=a.device))
-
-
-def paired_dots(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
+def paired_products(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
     """The inner product of a with b, element by element of the (broadcast) batch.
 
     Integers: exact, in int64, where their types and d prove that it fits (int8 by anything up to int32, say).
@@ -99,10 +84,10 @@ def paired_dots(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) 
 def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
     """Euclidean length in float64, with a gradient of 0 at the zero vector.
 
-    Integers: the root of `paired_dots`. Floats: correct at any scale; NaN where an element is NaN or infinite.
+    Integers: the root of `paired_products`. Floats: correct at any scale; NaN where an element is NaN or infinite.
     """
     if x.dtype == torch.int8 and x.dim() == 2 and not torch.compiler.is_exporting() and len(x) > _FEW:
-        return root(by_blocks(_int8_squares, x, row_bytes=4 * x.shape[-1]))
+        return safe_sqrt(by_blocks(_int8_squares, x, row_bytes=4 * x.shape[-1]))
     _, lengths, unit = in_range(x)
     return lengths if unit is None else lengths * unit[..., 0].to(torch.float64)
 
@@ -110,12 +95,12 @@ def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
 def cosines(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
     """The cosine of a with b, element by element of the (broadcast) batch, in float64 and independent of scale."""
     (a, a_lengths, _), (b, b_lengths, _) = in_range(a), in_range(b)
-    return divide(paired_dots(a, b), a_lengths * b_lengths)
+    return safe_divide(paired_products(a, b), a_lengths * b_lengths)
 
 
 def widened(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
     """Bits as votes, half precision as float32; any other tensor as it is."""
-    return x.to(torch.float32) if x.dtype in (torch.float16, torch.bfloat16) else signed(x)
+    return x.to(torch.float32) if x.dtype in (torch.float16, torch.bfloat16) else as_bipolar(x)
 
 
 _SHORTEST, _LONGEST = 2.0**-30, 2.0**50
@@ -146,9 +131,11 @@ def units(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch 1"]:
 
 def _lengths(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
     if x.dim() != 2:
-        return root(paired_dots(x, x))
+        return safe_sqrt(paired_products(x, x))
     # In blocks, the squares stay in the cache.
-    return by_blocks(lambda rows: root(paired_dots(rows, rows)), x, row_bytes=2 * x.shape[1] * x.dtype.itemsize)
+    return by_blocks(
+        lambda rows: safe_sqrt(paired_products(rows, rows)), x, row_bytes=2 * x.shape[1] * x.dtype.itemsize
+    )
 
 
 def in_range(
@@ -160,13 +147,13 @@ def in_range(
     """
     x = widened(x)
     if is_integer(x):
-        return x, root(paired_dots(x, x)), None
+        return x, safe_sqrt(paired_products(x, x)), None
     if readable(x) and ordinary(lengths := _lengths(x)):
         return x, lengths, None
     unit = units(x)
     # A division of complex numbers would take products of them, which vanish.
     x = torch.view_as_complex(torch.view_as_real(x.resolve_conj()) / unit[..., None]) if x.is_complex() else x / unit
-    return x, root(paired_dots(x, x)), unit
+    return x, safe_sqrt(paired_products(x, x)), unit
 
 
 def in_units(x: Shaped[Tensor, "*batch d"]) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch 1"] | None]:
@@ -184,17 +171,17 @@ def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
     return torch.stack([part.sum(-1).to(torch.float64) for part in squares.split(1023, -1)]).sum(0)
 
 
-def root(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
+def safe_sqrt(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
     """The square root in float64, with a gradient of 0 at 0."""
     squares = squares.to(torch.float64)
     return torch.where(squares == 0, 0.0, torch.where(squares == 0, 1.0, squares).sqrt())
 
 
-def divide(values: Shaped[Tensor, "*s"], lengths: Shaped[Tensor, "*t"]) -> Shaped[Tensor, "*s"]:
+def safe_divide(values: Shaped[Tensor, "*s"], lengths: Shaped[Tensor, "*t"]) -> Shaped[Tensor, "*s"]:
     """`values / lengths`, and 0 where the length is 0: a zero vector is similar to nothing."""
     return torch.where(lengths == 0, 0.0, values / torch.where(lengths == 0, 1.0, lengths))
 
 
-def scaled(products: Shaped[Tensor, "*batch"], lengths: Shaped[Tensor, "*#batch"]) -> Shaped[Tensor, "*batch"]:
-    """`divide` for products with vectors of these lengths: those with a zero vector are 0 already, so one pass does."""
+def over_lengths(products: Shaped[Tensor, "*batch"], lengths: Shaped[Tensor, "*#batch"]) -> Shaped[Tensor, "*batch"]:
+    """`safe_divide` for products with vectors of these lengths; those with a zero vector are 0 already."""
     return products / torch.where(lengths == 0, 1.0, lengths)
