@@ -12,6 +12,7 @@ from torch.testing import assert_close
 
 from torchvsa import MAP
 from torchvsa._kernels.integer_products import integer_products
+from torchvsa._kernels.look_up import gather_reduce
 from torchvsa._kernels.rotation import roll_rows
 from torchvsa._numerics import inner_products
 
@@ -63,6 +64,34 @@ def test_rotations_are_mapped_and_differentiated() -> None:
     (roll_rows(leaf, starts[0]) * rows[1]).sum().backward()
     assert leaf.grad is not None
     assert torch.equal(leaf.grad, turned(rows[1], -starts[0]))
+
+
+STEPS: list[tuple[Any, bool, Callable[[np.ndarray], np.ndarray], torch.dtype]] = [
+    *((Tensor.add_, True, lambda rows: rows.sum(0).clip(-1, 1), dtype) for dtype in (torch.int8, torch.float64)),
+    *((Tensor.mul_, False, lambda rows: rows.prod(0), dtype) for dtype in (torch.int8, torch.float32)),
+    (Tensor.bitwise_xor_, False, np.bitwise_xor.reduce, torch.bool),
+]
+
+
+@pytest.mark.parametrize(("step", "clip", "expected", "dtype"), STEPS)
+@pytest.mark.parametrize("lists", [1, 2, 4])
+def test_entries_are_put_together(lists: int, step: Any, clip: bool, expected: Any, dtype: torch.dtype) -> None:
+    # More bytes than a block holds.
+    table, indices = drawn(lists, 4, 200_000, dtype=dtype), drawn(30, lists, dtype=torch.int64, seed=1) % 4
+    numbers = [table.numpy()[range(lists), row] for row in indices.numpy()]
+    wanted = torch.from_numpy(np.stack([expected(rows) for rows in numbers])).to(dtype)
+    assert torch.equal(gather_reduce(table, indices, step, clip), wanted)
+    assert gather_reduce(table, indices[:0], step, clip).shape == (0, 200_000)
+    small = table[..., :9].contiguous()
+    assert torch.equal(vmap(lambda rows: gather_reduce(small, rows[None], step, clip)[0])(indices), wanted[:, :9])
+    assert torch.equal(whole(gather_reduce)(small, indices, step, clip), wanted[:, :9])
+    torch.compiler.reset()
+
+
+def test_looking_up_is_differentiated() -> None:
+    table, indices = drawn(3, 4, 5).requires_grad_(), drawn(6, 3, dtype=torch.int64, seed=1) % 4
+    assert torch.autograd.gradcheck(lambda x: gather_reduce(x, indices, Tensor.mul_), (table,))
+    assert torch.autograd.gradcheck(lambda x: gather_reduce(x, indices, Tensor.add_), (table,))
 
 
 def test_products_of_floats_are_as_near_as_those_of_pytorch() -> None:

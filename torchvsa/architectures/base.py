@@ -12,6 +12,7 @@ from torch import Tensor
 
 from torchvsa._blocks import by_blocks
 from torchvsa._checks import INTEGERS, whole_number
+from torchvsa._kernels.look_up import entries
 from torchvsa._kernels.rotation import roll_rows
 from torchvsa._memory_limit import require_memory
 from torchvsa._numerics import as_bipolar, cosines, is_integer, norms
@@ -226,8 +227,8 @@ class VSA(ABC):
         wide = self._type_of_sums(len(table))
 
         def bundled(rows: Tensor) -> Tensor:
-            first, *others = entries(table, rows)
-            return self.normalize(reduce(Tensor.add_, others, first.to(wide)))
+            vectors = entries(table, rows)
+            return self.normalize(reduce(Tensor.add_, vectors, next(vectors).to(wide)))
 
         return by_blocks(bundled, places, row_bytes=self.dim * (wide.itemsize + self.dtype.itemsize))
 
@@ -304,8 +305,3 @@ class VSA(ABC):
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
         """Whether the elements are such as a hypervector can have."""
         return bool(x.isfinite().all())
-
-
-def entries(table: Shaped[Tensor, "n entries d"], places: Int[Tensor, "batch n"]) -> list[Shaped[Tensor, "batch d"]]:
-    """`table[i, places[:, i]]` for each i; copied row by row, far faster than by plain indexing."""
-    return [rows.index_select(0, column) for rows, column in zip(table, places.unbind(1), strict=True)]

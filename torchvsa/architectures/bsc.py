@@ -1,10 +1,11 @@
 """Binary Spatter Codes."""
 
 import torch
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int, Shaped
 from torch import Tensor
 
 from torchvsa._checks import refuse_nan
+from torchvsa._kernels.look_up import gather_reduce
 from torchvsa._numerics import as_bipolar, norms
 from torchvsa.architectures._random import random_bits
 from torchvsa.architectures._sums import multiplied, stacked
@@ -50,6 +51,12 @@ class BSC(VSA):
         if a.dtype == torch.bool and b.dtype == torch.bool:
             return a ^ b
         return multiplied(as_bipolar(a), as_bipolar(b))
+
+    def _bind_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """See `VSA._bind_entries`."""
+        return gather_reduce(table, places, Tensor.bitwise_xor_)
 
     def unbind(
         self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]

@@ -3,10 +3,11 @@
 from typing import Literal
 
 import torch
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int, Shaped
 from torch import Tensor
 
 from torchvsa._checks import narrowed, refuse_nan
+from torchvsa._kernels.look_up import gather_reduce
 from torchvsa._numerics import inner_products, is_integer, safe_sqrt, units, widened
 from torchvsa.architectures._random import random_bits
 from torchvsa.architectures._sums import multiplied, stacked
@@ -120,6 +121,20 @@ class MAP(VSA):
         if self.variant == "B" and (voters := first_two(xs, dim, weights)) is not None:
             return self._signs(raw, self.permute(self.bind(*voters), 1))
         return self.normalize(raw)
+
+    def _bundle_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """See `VSA._bundle_entries`."""
+        if self.variant != "C" or table.dtype != self._type_of_sums(len(table)):
+            return super()._bundle_entries(table, places)
+        return gather_reduce(table, places, Tensor.add_, clip=True)
+
+    def _bind_entries(
+        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
+    ) -> Shaped[Tensor, "batch d"]:
+        """See `VSA._bind_entries`."""
+        return gather_reduce(table, places, Tensor.mul_)
 
     def _bundle_pair(
         self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]
