@@ -6,10 +6,12 @@ from typing import Any
 import torch
 from torch.testing import assert_close
 
-from behaviours import OneShot
+from behaviours import Actuator, Demonstrations, OneShot, Schema, Sensor, Space
 from benchmarks import corral
 from benchmarks.harness import INPUTS, Case
 from benchmarks.literal import Literal
+from torchvsa import MAP
+from torchvsa.encoders import ThresholdFeatures
 
 
 def cases(device: str, small: bool = False) -> Iterator[Case]:
@@ -25,11 +27,13 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     literal.learn(space.cells(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)
     options: Any = {"guard_filter_fn": torch.compiler.skip_guard_on_all_nn_modules_unsafe}
-    compiled: Any = torch.compile(behaviour.freeze(), fullgraph=True, dynamic=False, options=options)
+    frozen = behaviour.freeze()
+    compiled: Any = torch.compile(frozen, fullgraph=True, dynamic=False, options=options)
     for name, ask, rows, differ in (
         ("Algorithm 2", behaviour, batch, False),
         ("Algorithm 2, all different", behaviour, batch, True),
         ("Algorithm 2, one control tick", behaviour, 1, False),
+        ("Algorithm 2, one control tick, frozen", frozen, 1, False),
         ("Algorithm 2, one control tick, compiled", compiled, 1, False),
     ):
         readings = [
@@ -53,8 +57,36 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
             name,
             f"B={rows} d={dim}",
             lambda index, ask=ask, readings=readings: ask(readings[index]),
-            {"literal steps on torchhd": lambda index, asked=asked: literal.recall(asked[index])},
+            {"literal steps on torchhd": lambda index, asked=asked: literal.recall(asked[index])}
+            | ({"not frozen": lambda index, readings=readings: behaviour(readings[index])} if ask is frozen else {}),
             check,
             calls=1 if rows > 1 else (4 if small else 100),
             more={"distinct": min(len(some.unique(dim=0)) for some in bins)},
         )
+    yield _threshold_features(dim, device, small)
+
+
+def _threshold_features(dim: int, device: str, small: bool) -> Case:
+    """One control tick of a robot with 24 sensors and the default encoder."""
+    generator = torch.Generator().manual_seed(0)
+    sensors = [Sensor(f"sensor {place}", 0, 1) for place in range(24)]
+    schema = Schema(sensors, [Actuator("turn", -1, 1, levels=3)])
+    space = Space(schema, ThresholdFeatures(MAP(dim, dtype=torch.int8), 24, bins=256, subset=2)).to(device)
+    readings = torch.rand(300, 24, generator=generator, dtype=torch.float64)
+    commands = torch.sign(readings[:, :1] - readings[:, 1:2])
+    behaviour = OneShot().fit(space, Demonstrations(readings, commands))
+    frozen, rows = behaviour.freeze(), readings[:INPUTS, None]
+
+    def check() -> None:
+        for row in rows:
+            for mine, theirs in zip(frozen(row)[:4], behaviour(row)[:4], strict=True):
+                assert_close(mine, theirs, rtol=0, atol=0)
+
+    return Case(
+        "24 sensors with thresholds, one control tick, frozen",
+        f"B=1 d={dim}",
+        lambda index: frozen(rows[index]),
+        {"not frozen": lambda index: behaviour(rows[index])},
+        check,
+        calls=4 if small else 100,
+    )

@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text()
 
 
-FIRST, KINDS, PAPER, CLASSIFIER = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+FIRST, KINDS, PAPER, CLASSIFIER, SUMS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
 def run(code: str) -> str:
@@ -37,6 +37,10 @@ def test_the_parts_of_the_paper_are_made() -> None:
 
 def test_the_classifier_scores_what_one_would_hope() -> None:
     assert float(run(CLASSIFIER)) > 0.99
+
+
+def test_behaviours_add_up() -> None:
+    assert "sum of seek, 2 * avoid" in run(SUMS)
 
 
 def test_the_files_that_it_names_are_there() -> None:
