@@ -16,8 +16,8 @@ from behaviours.recall import Recall, recalled
 from behaviours.space import Space
 from torchvsa import Readout
 from torchvsa._blocks import by_blocks
-from torchvsa._kernels.rows import Row, noise, real, row_encoder
 from torchvsa._numerics import as_bipolar, in_units, norms, real_parts
+from torchvsa._rows import Row, noise, real, row_encoder
 
 
 class FrozenBehaviour(Controller):
@@ -28,7 +28,7 @@ class FrozenBehaviour(Controller):
     equally good within 1e-5) and with similarity, margin and familiarity that differ by less than 1e-5.
 
     One row is answered by NumPy, in less than a tenth of the time, where architecture, encoder and protection have a
-    form for it (`torchvsa._kernels.rows`); any other batch as its behaviour would. It can be compiled too:
+    form for it (`torchvsa._rows`); any other batch as its behaviour would. It can be compiled too:
 
         tick = torch.compile(behaviour.freeze(), fullgraph=True)
         tick(torch.tensor([[0.3, 1.2, 0.5]], dtype=torch.float64)).commands

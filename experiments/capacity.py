@@ -24,11 +24,8 @@ from rich.console import Console
 from experiments.choices import check_chosen, check_differ
 from experiments.command_line import errors_in_one_line, job
 from experiments.driving import progress_bars, workers
-from experiments.pairs_held import CONDITIONS, Row, bracket, expected, halve, measure, parts
+from experiments.pairs_held import CLOSED_FORM, CONDITIONS, Row, bracket, expected, halve, measure, parts, recalls
 from experiments.results import Results
-
-CLOSED_FORM = "closed_form"
-"""The row that is computed and not measured."""
 
 
 def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
@@ -117,11 +114,6 @@ def _table(config: Mapping[str, Any], found: Mapping[tuple[str, int, int], int],
         table.append({"learner": CLOSED_FORM, "dim": dim, "pairs": float(pairs), "pairs_min": None, "pairs_max": None})
         table[-1] |= {"pairs_per_dim": pairs / dim, "seconds": None}
     return table
-
-
-def recalls(records: list[Row], learner: str, dim: int, pairs: int) -> list[float]:
-    """The recall of that many pairs in each repeat that measured it."""
-    return [r["recall"] for r in records if (r["learner"], r["dim"], r["pairs"]) == (learner, dim, pairs)]
 
 
 def _metrics(config: Mapping[str, Any], table: list[Row], records: list[Row]) -> dict[str, float | None]:

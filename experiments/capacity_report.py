@@ -13,10 +13,9 @@ from rich.console import Console
 from rich.table import Table
 
 from behaviours.storage import write_atomically
-from experiments.capacity import CLOSED_FORM, recalls
 from experiments.corral_tables import number
 from experiments.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PINK, SKY, STYLE, VERMILION, png
-from experiments.pairs_held import LEVELS, RESULTS, SCHEMA, VALUES, expected
+from experiments.pairs_held import CLOSED_FORM, LEVELS, RESULTS, SCHEMA, VALUES, expected, recalls
 from experiments.report import Page
 from experiments.results import Results, Row
 

@@ -24,7 +24,7 @@ from rich.table import Table
 
 import sim
 from behaviours import Behaviour, BehaviourBank, Policy, Space
-from experiments import presets
+from experiments import hand_written, presets
 from experiments.agreement import Agreement, measure
 from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
@@ -60,6 +60,8 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     # Settings that cannot be built are found before anything is driven.
     reference = presets.space(config["vsa"], config, config["seed"])
     presets.rule(config["rule"])
+    if "hand_written" in config["controllers"]:
+        hand_written.behaviour(reference.vsa, config["seed"])
     train = None if config["demonstrations_file"] is None else from_file(config["demonstrations_file"])
     with workers(config["workers"]) as executor, progress_bars(console) as progress:
         driver = Driver(config, executor, progress)

@@ -25,6 +25,9 @@ RESULTS = LEVELS ** len(SCHEMA.actuators)
 STEP = 1.25
 """The factor by which a search goes up or down until it has found a number on either side."""
 
+CLOSED_FORM = "closed_form"
+"""The row that is computed and not measured."""
+
 Row = dict[str, Any]
 
 
@@ -146,6 +149,11 @@ def halve(holds: Callable[[int], bool], low: int, high: int, precision: float) -
         middle = (low + high) // 2
         low, high = (middle, high) if holds(middle) else (low, middle)
     return low
+
+
+def recalls(records: list[Row], learner: str, dim: int, pairs: int) -> list[float]:
+    """The recall of that many pairs in each repeat that measured it."""
+    return [r["recall"] for r in records if (r["learner"], r["dim"], r["pairs"]) == (learner, dim, pairs)]
 
 
 def expected(dim: int, pairs: int) -> float:

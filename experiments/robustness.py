@@ -83,6 +83,8 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     for parts in (config, config["one_shot"]):
         presets.rule(parts["rule"])
         presets.space(config["vsa"], parts, config["seed"])
+    if "hand_written" in config["learners"]:
+        hand_written.behaviour(torchvsa.architecture(**config["vsa"]), config["seed"])
     with workers(config["workers"]) as executor, progress_bars(console) as progress:
         driver = Driver(config, executor, progress)
         numbers = range(FIRST_DEMONSTRATION, FIRST_DEMONSTRATION + config["demonstrations"])

@@ -27,6 +27,7 @@ def assert_refused(run: CompletedProcess[str], words: str, folder: Path) -> None
         ("controllers=[teacher,nobody]", "'nobody'"),
         ("vsa.name=MAP-X", "'MAP-X'"),
         ("vsa.dim=0", "dim"),
+        ("vsa.dim=8", "no weights of the five rules"),
         ("encoder.bins=0", "bins"),
         ("encoder.nonsense=3", "nonsense"),
         ("arena.preset=nowhere", "'nowhere'"),

@@ -1,4 +1,4 @@
-"""The hand-written program does what the teacher does, for any random codebooks."""
+"""The hand-written program does what the teacher does, for any random codebooks, or says that it cannot."""
 
 from itertools import product
 
@@ -8,32 +8,79 @@ import torch
 
 import sim
 import torchvsa
+from behaviours import Behaviour, Controller
 from experiments import hand_written
+from sim.teacher import COMMANDS
+
+READINGS = np.array(list(product([0.5, 5.0], [0.5, 5.0], [0.1, 0.9])))
+KINDS = [(name, None) for name in torchvsa.ARCHITECTURES] + [(f"MAP-{variant}", "int8") for variant in "BCI"]
 
 
-@pytest.mark.parametrize("seed", range(10))
-def test_all_eight_cases(seed: int) -> None:
-    behaviour = hand_written.behaviour(torchvsa.MAP(4000, dtype=torch.int8), seed)
-    readings = np.array(list(product([0.5, 5.0], [0.5, 5.0], [0.1, 0.9])))
-    np.testing.assert_array_equal(behaviour(readings).commands.numpy(), sim.Teacher()(readings))
+def right(behaviour: Controller) -> np.ndarray:
+    """In which of the eight cases the behaviour commands what the teacher does."""
+    return (behaviour(READINGS).commands.numpy() == sim.Teacher()(READINGS)).all(1)
 
 
-def test_the_weights_are_needed() -> None:
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("name", "dtype"), KINDS)
+def test_all_eight_cases(name: str, dtype: str | None, seed: int) -> None:
+    behaviour = hand_written.behaviour(torchvsa.architecture(name, 4000, dtype), seed)
+    assert right(behaviour).all()
+    assert right(behaviour.freeze()).all()
+
+
+@pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
+def test_few_dimensions_are_refused_rather_than_wrong(name: str) -> None:
+    written, refusals = [], []
+    for seed in range(20):
+        try:
+            written.append(hand_written.behaviour(torchvsa.architecture(name, 24), seed))
+        except ValueError as error:
+            refusals.append(str(error))
+    assert all(right(behaviour).all() for behaviour in written)
+    assert refusals
+    assert all("no weights of the five rules" in refusal for refusal in refusals)
+
+
+@pytest.mark.parametrize(("name", "dtype"), KINDS)
+def test_the_program_is_the_sum_of_the_rules_with_whole_weights(name: str, dtype: str | None) -> None:
+    behaviour = hand_written.behaviour(torchvsa.architecture(name, 4000, dtype), 0)
+    pairs = rules(behaviour)
+    weights = torch.linalg.lstsq(as_columns(pairs), as_columns(behaviour.program[None])).solution[:, 0]
+    torch.testing.assert_close(weights, weights.round(), atol=1e-4, rtol=0)
+    assert (weights.round() >= 1).all()
+
+
+@pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
+def test_the_weights_are_needed(name: str) -> None:
     """With equal weights the five rules shout each other down in at least one of the eight cases."""
-    behaviour = hand_written.behaviour(torchvsa.MAP(4000, dtype=torch.int8), 0)
-    space = behaviour.space
-    conditions = space.encode(torch.tensor([condition for condition, _ in hand_written.RULES]))
-    results = space.items(
-        space.schema.command_levels(
-            sim.Teacher()(np.array([[0.5, 0.5, 0.9], [0.5, 5, 0.9], [5, 0.5, 0.9], [5, 5, 0.1], [5, 5, 0.9]]))
-        )
-    )
-    behaviour.program = space.vsa.superpose(space.vsa.bind(conditions, results))
-    readings = np.array(list(product([0.5, 5.0], [0.5, 5.0], [0.1, 0.9])))
-    assert (behaviour(readings).commands.numpy() != sim.Teacher()(readings)).any()
+    behaviour = hand_written.behaviour(torchvsa.architecture(name, 4000), 0)
+    behaviour.program = behaviour.space.vsa.superpose(rules(behaviour))
+    assert not right(behaviour).all()
+
+
+@pytest.mark.parametrize("variant", ["C", "I"])
+def test_the_weights_found_by_hand_suit_sums(variant: str) -> None:
+    behaviour = hand_written.behaviour(torchvsa.architecture(f"MAP-{variant}", 4000, "int8"), 0)
+    program = behaviour.space.vsa.superpose(rules(behaviour), weights=torch.tensor(hand_written.BY_HAND))
+    assert torch.equal(behaviour.program, program)
 
 
 def test_one_hypervector_of_five_rules() -> None:
     behaviour = hand_written.behaviour(torchvsa.MAP(1000, dtype=torch.int8), 0)
     assert behaviour.program.shape == (1000,)
     assert behaviour.report.pairs == len(hand_written.RULES) == len(sim.RULES)
+
+
+def rules(behaviour: Behaviour) -> torch.Tensor:
+    """The five pairs of condition and result `[5, d]`."""
+    space = behaviour.space
+    items = space.items(space.schema.command_levels(COMMANDS))
+    return space.vsa.bind(items, space.encode(torch.tensor(hand_written.RULES)))
+
+
+def as_columns(rows: torch.Tensor) -> torch.Tensor:
+    """Real columns `[e, k]`; bits count as votes, and a complex number as two."""
+    if rows.dtype == torch.bool:
+        rows = 1 - 2 * rows.int()
+    return (torch.view_as_real(rows).flatten(1) if rows.is_complex() else rows).double().T
