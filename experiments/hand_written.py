@@ -10,7 +10,7 @@ import sim
 from behaviours import Behaviour, LearningReport, Schema, Sensor, Space
 from experiments.presets import schema as learners_schema
 from sim.sensors import LIGHT_MAX
-from sim.teacher import COMMANDS, OBSTACLE
+from sim.teacher import OBSTACLE, TEACHER_COMMANDS
 from torchvsa import VSA
 from torchvsa.encoders import Lookup, Sum
 
@@ -24,7 +24,7 @@ RULES: tuple[tuple[tuple[int, int, int], int], ...] = (
     ((NO, NO, YES), 1),  # avoid obstacle
     ((NO, NO, NO), 1),  # cruise
 )
-"""(light left, light right, obstacle) and the weight of each rule, in the order of `sim.RULES`.
+"""(light left, light right, obstacle) and the weight of each rule, in the order of `sim.TEACHER_RULES`.
 
 A bundle has no `else`, so a rule also speaks, more softly, where its condition holds in part, and results that agree
 in one wheel support each other. The weights were found by hand: with s the sum of weight · (sensors that match, and
@@ -37,8 +37,8 @@ def space(vsa: VSA, seed: int) -> Space:
     thresholds = (LIGHT_MAX, LIGHT_MAX, OBSTACLE)
     sensors = [
         # The reading at a light sensor's maximum is the first that counts as dark.
-        Sensor(name, 0.0, 2 * threshold, unit, beyond="clip")
-        for (name, _, _, unit), threshold in zip(sim.SENSORS, thresholds, strict=True)
+        Sensor(sensor.name, 0.0, 2 * threshold, sensor.unit, beyond="clip")
+        for sensor, threshold in zip(sim.SENSORS, thresholds, strict=True)
     ]
     schema = Schema(sensors, learners_schema().actuators)
     return Space(schema, Sum(Lookup(vsa, bins=2), len(sensors)), seed=seed)
@@ -48,7 +48,7 @@ def behaviour(vsa: VSA, seed: int) -> Behaviour:
     """Five weighted rules, bundled raw into one program."""
     codes = space(vsa, seed)
     conditions = codes.encode(torch.tensor([condition for condition, _ in RULES]))
-    commands = codes.schema.command_levels(COMMANDS)
+    commands = codes.schema.command_levels(TEACHER_COMMANDS)
     weights = torch.tensor([weight for _, weight in RULES])
     program = vsa.superpose(vsa.bind(conditions, codes.items(commands)), weights=weights)
     results = commands[:3]  # avoid and cruise repeat the commands of the first two rules

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
 from sim.corral import Arena
 
 
-def photograph(client: int, arena: Arena, width: int = 480, height: int = 360) -> NDArray[np.uint8]:
+def render_rgb(client: int, arena: Arena, width: int = 480, height: int = 360) -> NDArray[np.uint8]:
     """The whole scene of `client` from obliquely above, `[height, width, 3]` uint8.
 
     The lamp is to the right. Raises `ValueError` for a size below 1 pixel.

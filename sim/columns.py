@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.fleet import State
 from sim.robot import ACTUATORS, CONTROL_HZ
 from sim.sensors import SENSORS
 from sim.tracker import Tracker
+from sim.vector_sim import State
 
 
 class EpisodeColumns:

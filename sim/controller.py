@@ -47,7 +47,7 @@ class Controller(Protocol):
         ...
 
 
-Policy = Controller | Callable[[Any], Any]
+ControllerLike = Controller | Callable[[Any], Any]
 """What can drive: a controller; or, without memory, a function or `nn.Module` from readings `[B, n]` to an answer."""
 
 
@@ -65,7 +65,7 @@ class _Stateless:
         return self.function(readings), state
 
 
-def as_controller(policy: Policy) -> Controller:
+def as_controller(policy: ControllerLike) -> Controller:
     """`policy` itself if it is a controller, else the function as one without state.
 
     Raises `TypeError` for what is neither.
@@ -110,7 +110,7 @@ def advance(controller: Controller, readings: NDArray[np.float64], state: Any, w
     return _plain(answer), after
 
 
-def replay(policy: Policy, readings: NDArray[np.float64], episodes: NDArray[np.int64]) -> NDArray[Any]:
+def replay(policy: ControllerLike, readings: NDArray[np.float64], episodes: NDArray[np.int64]) -> NDArray[Any]:
     """What a policy answers to recorded readings `[N, n]`, `[N, ...]`, as if it had been there from the start.
 
     `episodes` `[N]` says which episode each row is of; the rows of an episode are its steps from 0 on, in this order.

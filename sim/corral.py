@@ -10,9 +10,9 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
 from sim.checks import whole_number
 
 WALL_GROUP, WALL_MASK = 1, 3

@@ -11,13 +11,14 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.camera import photograph
+from sim.camera import render_rgb
+from sim.channel import Channel
 from sim.checks import whole_number
 from sim.corral import Arena
-from sim.fleet import Fleet, State, check_commands, control_steps
 from sim.robot import ACTUATORS, CONTROL_HZ
 from sim.sensors import SENSORS
 from sim.tracker import DWELL_SECONDS, Tracker
+from sim.vector_sim import State, VectorSim, check_commands, control_steps
 
 MAX_STEPS = 60 * CONTROL_HZ
 """Control steps after which Gymnasium truncates an episode: 60 s."""
@@ -26,8 +27,8 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
-def _box(table: tuple[tuple[str, float, float, str], ...]) -> spaces.Box:
-    low, high = np.array([[row[1], row[2]] for row in table]).T
+def _box(channels: tuple[Channel, ...]) -> spaces.Box:
+    low, high = np.array([(channel.low, channel.high) for channel in channels]).T
     return spaces.Box(low, high, dtype=np.float64)
 
 
@@ -36,27 +37,27 @@ def _check_render_mode(render_mode: str | None) -> None:
         raise ValueError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
 
 
-class _Cells:
+class _EnvState:
     """What both environments share: robots, their episodes, and what counts in them."""
 
     def __init__(self, size: int, arena: str | Arena, body: str, dwell: float) -> None:
         self.tracker = Tracker(size, control_steps(dwell))
-        self.fleet = Fleet(size, arena, body)
+        self.simulator = VectorSim(size, arena, body)
         self.episodes = np.zeros(size, dtype=np.int64)
 
     def reset(self, slot: int, episode: int) -> None:
-        self.fleet.reset(slot, episode)
+        self.simulator.reset(slot, episode)
         self.tracker.reset(slot)
         self.episodes[slot] = episode
 
     def check_open(self) -> None:
         """Raise if the physics clients are disconnected."""
-        if self.fleet.closed:
+        if self.simulator.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed; make another one")
 
     def observe(self) -> State:
         slots = range(len(self.episodes))
-        state = self.fleet.observe(slots)
+        state = self.simulator.observe(slots)
         self.tracker.observe(np.arange(len(self.episodes)), state)
         return state
 
@@ -64,7 +65,7 @@ class _Cells:
         commands = check_commands(action, len(slots))
         if not np.isfinite(commands).all():
             raise ValueError(f"action {commands.tolist()}; expected finite commands in [-1, 1]")
-        self.fleet.drive(slots, commands)
+        self.simulator.drive(slots, commands)
 
     def info(self, state: State) -> dict[str, NDArray[Any]]:
         return {
@@ -151,7 +152,7 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self.render_mode = render_mode
         self.observation_space = _box(SENSORS)
         self.action_space = _box(ACTUATORS)
-        self._cells = _Cells(1, arena, body, dwell)
+        self._state = _EnvState(1, arena, body, dwell)
         self._episode: int | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
@@ -159,7 +160,7 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
         Raises `ValueError` for an option other than `episode`, and unless seed and episode are whole numbers from 0 on.
         """
-        self._cells.check_open()
+        self._state.check_open()
         unknown = set(options or {}) - {"episode"}
         if unknown:
             raise ValueError(f"unknown reset options {sorted(map(str, unknown))}; expected 'episode' alone")
@@ -168,37 +169,37 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         super().reset(seed=seed)
         before = self._episode
         if seed is not None or before is None:
-            self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+            self._state.simulator.seed = int(self.np_random.integers(2**31)) if seed is None else seed
             before = -1
         self._episode = before + 1 if asked is None else asked
-        self._cells.reset(0, self._episode)
-        state = self._cells.observe()
+        self._state.reset(0, self._episode)
+        state = self._state.observe()
         return state.sensors[0], self._info(state)
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Drive for one control step. Raises `ValueError` for an action that is not two finite numbers."""
-        self._cells.check_open()
+        self._state.check_open()
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        self._cells.drive([0], [action])
-        state = self._cells.observe()
-        success = bool(self._cells.tracker.success[0])
+        self._state.drive([0], [action])
+        state = self._state.observe()
+        success = bool(self._state.tracker.success[0])
         return state.sensors[0], float(success), success, False, self._info(state)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """A picture `[H, W, 3]`, or None without a render mode."""
         if self.render_mode is None:
             return None
-        self._cells.check_open()
-        return photograph(self._cells.fleet.worlds[0].client, self._cells.fleet.arena)
+        self._state.check_open()
+        return render_rgb(self._state.simulator.worlds[0].client, self._state.simulator.arena)
 
     def close(self) -> None:
         """Disconnect the physics client; closing twice is fine."""
-        self._cells.fleet.close()
+        self._state.simulator.close()
 
     def _info(self, state: State) -> dict[str, Any]:
         return {
-            name: column[0] if column.ndim > 1 else column[0].item() for name, column in self._cells.info(state).items()
+            name: column[0] if column.ndim > 1 else column[0].item() for name, column in self._state.info(state).items()
         }
 
 
@@ -236,53 +237,53 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._max_episode_steps = max_episode_steps
-        self._cells = _Cells(num_envs, arena, body, dwell)
+        self._state = _EnvState(num_envs, arena, body, dwell)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._ready = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin the first episode of every environment. Raises `ValueError` for any option, and as the scalar does."""
-        self._cells.check_open()
+        self._state.check_open()
         if options:
             raise ValueError(f"unknown reset options {sorted(map(str, options))}; the vector environment takes none")
         seed = None if seed is None else whole_number("seed", seed)
         super().reset(seed=seed)
-        self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+        self._state.simulator.seed = int(self.np_random.integers(2**31)) if seed is None else seed
         for slot in range(self.num_envs):
-            self._cells.reset(slot, slot)
+            self._state.reset(slot, slot)
         self._over[:] = False
         self._ready = True
-        state = self._cells.observe()
-        return state.sensors, self._cells.info(state)
+        state = self._state.observe()
+        return state.sensors, self._state.info(state)
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, Flags, Flags, dict[str, Any]]:
         """Drive each robot for one control step, or begin its next episode if the last one is over."""
-        self._cells.check_open()
+        self._state.check_open()
         if not self._ready:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         commands = check_commands(actions, self.num_envs)
         again = self._over
         going = np.flatnonzero(~again).tolist()
         if going:
-            self._cells.drive(going, commands[going])
+            self._state.drive(going, commands[going])
         for slot in np.flatnonzero(again).tolist():
-            self._cells.reset(slot, int(self._cells.episodes[slot]) + self.num_envs)
-        state = self._cells.observe()
-        terminated = self._cells.tracker.success.copy()
-        truncated = ~terminated & (self._cells.tracker.clock >= self._max_episode_steps)
+            self._state.reset(slot, int(self._state.episodes[slot]) + self.num_envs)
+        state = self._state.observe()
+        terminated = self._state.tracker.success.copy()
+        truncated = ~terminated & (self._state.tracker.clock >= self._max_episode_steps)
         self._over = terminated | truncated
-        return state.sensors, terminated.astype(np.float64), terminated, truncated, self._cells.info(state)
+        return state.sensors, terminated.astype(np.float64), terminated, truncated, self._state.info(state)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """One picture `[H, W, 3]` per environment, or None without a render mode."""
         if self.render_mode is None:
             return None
-        self._cells.check_open()
-        return tuple(photograph(world.client, self._cells.fleet.arena) for world in self._cells.fleet.worlds)
+        self._state.check_open()
+        return tuple(render_rgb(world.client, self._state.simulator.arena) for world in self._state.simulator.worlds)
 
     def close_extras(self, **_: Any) -> None:
         """Disconnect the physics clients."""
-        self._cells.fleet.close()
+        self._state.simulator.close()
 
 
 def register() -> None:

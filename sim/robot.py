@@ -10,8 +10,8 @@ import math
 from pathlib import Path
 from typing import Protocol
 
-import pybullet
-
+from sim._pybullet import pybullet
+from sim.channel import Channel
 from sim.corral import ROBOT_GROUP, ROBOT_MASK, WALL_GROUP, WALL_MASK, Start
 
 RADIUS = 0.15
@@ -27,11 +27,11 @@ WHEEL_RADIUS = 0.04
 HEIGHT = 0.06
 """Height of the body's centre above the floor, m."""
 
-ACTUATORS: tuple[tuple[str, float, float, str], ...] = (
-    ("left_motor", -1.0, 1.0, "fraction of full speed"),
-    ("right_motor", -1.0, 1.0, "fraction of full speed"),
+ACTUATORS = (
+    Channel("left_motor", -1.0, 1.0, "fraction of full speed"),
+    Channel("right_motor", -1.0, 1.0, "fraction of full speed"),
 )
-"""The commands in order: (name, low, high, unit)."""
+"""The commands, in order."""
 
 Pose = tuple[float, float, float, float]
 """x, y in m, cosine and sine of the heading."""

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from sim.checks import whole_number
 from sim.columns import EpisodeColumns, StepColumns
-from sim.controller import Controller, Policy, advance, append, as_controller, begin
+from sim.controller import Controller, ControllerLike, advance, append, as_controller, begin
 from sim.corral import Arena, find_arena
-from sim.fleet import Fleet, check_commands, control_steps
 from sim.result import Rollout, Steps
 from sim.robot import ACTUATORS, find_body
 from sim.state import rows_of
 from sim.tracker import DWELL_SECONDS, Tracker
+from sim.vector_sim import VectorSim, check_commands, control_steps
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class _Task:
 
 
 def rollout(
-    policy: Policy,
+    policy: ControllerLike,
     arena: str | Arena = "default",
     body: str = "planar",
     episodes: Iterable[int] = range(200),
@@ -123,7 +123,8 @@ def _spread(
     workers: int,
     progress: Callable[[int], object] | None,
 ) -> list[dict[str, NDArray[Any]]]:
-    # A few chunks per worker keep the workers evenly busy and the progress moving; below a full fleet they waste time.
+    # A few chunks per worker keep the workers evenly busy and the progress moving. Chunks of fewer episodes than
+    # `robots` waste time.
     chunks = max(min(workers, len(numbers)), min(4 * workers, len(numbers) // task.robots))
     # Not forked: a child must not inherit the parent's threads and physics clients.
     own = ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if executor is None else None
@@ -150,16 +151,16 @@ def _drive(
     tracker = Tracker(size, task.dwell_steps)
     episodes = EpisodeColumns(numbers)
     rows = StepColumns(task.record)
-    with Fleet(size, task.arena, task.body, task.seed) as fleet:
+    with VectorSim(size, task.arena, task.body, task.seed) as simulator:
         place = np.arange(size)  # the position in `numbers` of each slot's episode
         for slot in range(size):
-            start = fleet.reset(slot, int(numbers[slot]))
+            start = simulator.reset(slot, int(numbers[slot]))
             episodes.start[slot] = start.x, start.y, start.heading
         waiting = size
         slots = np.arange(size)
         memory = begin(task.controller, numbers[:size])
         while slots.size:
-            state = fleet.observe(slots.tolist())
+            state = simulator.observe(slots.tolist())
             tracker.observe(slots, state)
             done = tracker.success[slots] | (tracker.clock[slots] >= task.steps)
             for slot in slots[done].tolist():
@@ -177,12 +178,12 @@ def _drive(
                 contact, at_lamp = state.contact[~done], state.at_lamp[~done]
                 episodes.count(place[going], contact, at_lamp, reached)
                 rows.add(place[going], step, state, ~done, commands, reached)
-                fleet.drive(going.tolist(), commands)
+                simulator.drive(going.tolist(), commands)
             finished = slots[done]
             refilled = finished[: len(numbers) - waiting]
             for slot in refilled.tolist():
                 tracker.reset(slot)
-                start = fleet.reset(slot, int(numbers[waiting]))
+                start = simulator.reset(slot, int(numbers[waiting]))
                 episodes.start[waiting] = start.x, start.y, start.heading
                 place[slot] = waiting
                 waiting += 1
@@ -205,7 +206,7 @@ def _check(answer: object, episodes: NDArray[np.int64], steps: NDArray[np.int64]
     bad = ~np.isfinite(commands).all(axis=1)
     if bad.any():
         row = int(np.argmax(bad))
-        names = ", ".join(name for name, *_ in ACTUATORS)
+        names = ", ".join(actuator.name for actuator in ACTUATORS)
         raise ValueError(
             f"episode {episodes[row]}, step {steps[row]}: the policy commanded {commands[row].tolist()} ({names}); "
             "expected finite numbers"

@@ -10,9 +10,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
+from sim.channel import Channel
 from sim.corral import WALL_GROUP, Arena
 from sim.robot import RADIUS
 
@@ -32,12 +33,12 @@ BEAMS = (0.0, 0.4, -0.4)
 SENSOR_HEIGHT = 0.16
 """Height of all beams, m: above the lamp, below the top of the walls."""
 
-SENSORS: tuple[tuple[str, float, float, str], ...] = (
-    ("light_left", 0.0, LIGHT_MAX, "m"),
-    ("light_right", 0.0, LIGHT_MAX, "m"),
-    ("distance", 0.0, DISTANCE_MAX, "m"),
+SENSORS = (
+    Channel("light_left", 0.0, LIGHT_MAX, "m"),
+    Channel("light_right", 0.0, LIGHT_MAX, "m"),
+    Channel("distance", 0.0, DISTANCE_MAX, "m"),
 )
-"""The readings in order: (name, low, high, unit)."""
+"""The readings, in order."""
 
 
 class SensorArray:

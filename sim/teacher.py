@@ -15,15 +15,21 @@ OBSTACLE = 0.22
 """An obstacle is sensed below this distance, m. No edge of 16, 20, 24, 32, 48 or 64 equal bins over the sensor's range
 lies on it, so a learner that bins the range equally is not handed the threshold."""
 
-RULES: tuple[str, ...] = ("stay_in_light", "turn_left_to_light", "turn_right_to_light", "avoid_obstacle", "cruise")
+TEACHER_RULES: tuple[str, ...] = (
+    "stay_in_light",
+    "turn_left_to_light",
+    "turn_right_to_light",
+    "avoid_obstacle",
+    "cruise",
+)
 """The rules in order; the first whose condition holds fires."""
 
 BEHAVIOURS: dict[str, tuple[int, ...]] = {"seek_light": (0, 1, 2), "avoid": (3,), "cruise": (4,)}
-"""The behaviours that the rules make up: name -> indices into `RULES`."""
+"""The behaviours that the rules make up: name -> indices into `TEACHER_RULES`."""
 
-COMMANDS: NDArray[np.float64] = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+TEACHER_COMMANDS: NDArray[np.float64] = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
 """What each rule commands `[5, 2]`: left and right wheel."""
-COMMANDS.flags.writeable = False
+TEACHER_COMMANDS.flags.writeable = False
 
 
 class Teacher:
@@ -37,10 +43,13 @@ class Teacher:
         self.obstacle_below = obstacle_below
 
     def rule(self, sensors: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Index into `RULES` of the rule that fires, `[B]`. Raises `ValueError` unless `sensors` is `[B, 3]`."""
+        """The index into `TEACHER_RULES` of the rule that fires, `[B]`.
+
+        Raises `ValueError` unless `sensors` is `[B, 3]`.
+        """
         sensors = real_rows("sensors", sensors)
         if sensors.ndim != 2 or sensors.shape[1] != len(SENSORS):
-            names = ", ".join(name for name, *_ in SENSORS)
+            names = ", ".join(sensor.name for sensor in SENSORS)
             raise ValueError(f"sensors have shape {sensors.shape}; expected [B, {len(SENSORS)}] ({names})")
         left, right = (sensors[:, :2] < self.light_below).T
         obstacle = sensors[:, 2] < self.obstacle_below
@@ -49,4 +58,4 @@ class Teacher:
 
     def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commands `[B, 2]` for `sensors` `[B, 3]`."""
-        return COMMANDS[self.rule(sensors)]
+        return TEACHER_COMMANDS[self.rule(sensors)]

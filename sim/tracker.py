@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.fleet import State
+from sim.vector_sim import State
 
 DWELL_SECONDS = 2.0
 """How long a robot must stay at the lamp, without a break, to succeed."""
@@ -16,7 +16,7 @@ DWELL_SECONDS = 2.0
 class Tracker:
     """Follows the episodes of `size` slots, one observed state a control step.
 
-    Success: at the lamp (see `sim.fleet.TOUCH`) in every state of `dwell_steps` control steps in a row.
+    Success: at the lamp (see `sim.vector_sim.TOUCH`) in every state of `dwell_steps` control steps in a row.
 
     Attributes (each `[size]`):
         clock: index of the state observed last; -1 before the first.

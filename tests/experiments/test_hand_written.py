@@ -36,4 +36,4 @@ def test_the_weights_are_needed() -> None:
 def test_one_hypervector_of_five_rules() -> None:
     behaviour = hand_written.behaviour(torchvsa.MAP(1000, dtype=torch.int8), 0)
     assert behaviour.program.shape == (1000,)
-    assert behaviour.report.pairs == len(hand_written.RULES) == len(sim.RULES)
+    assert behaviour.report.pairs == len(hand_written.RULES) == len(sim.TEACHER_RULES)

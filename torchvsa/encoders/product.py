@@ -1,4 +1,4 @@
-"""Records that bind what the sensors read."""
+"""Records that bind the sensors' readings."""
 
 from collections.abc import Mapping
 from functools import reduce
@@ -7,7 +7,8 @@ import torch
 from jaxtyping import Bool, Int64, Shaped
 from torch import Tensor
 
-from torchvsa.encoders.record import Record, places
+from torchvsa.architectures._entries import bind_entries
+from torchvsa.encoders.record import Record, entry_indices
 from torchvsa.part import Layout
 
 
@@ -57,7 +58,7 @@ class Product(Record):
         return self.vsa.identity().to(like)
 
     def _join(self, table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        return self.vsa._bind_entries(table, places(table, cells))
+        return bind_entries(self.vsa, table, entry_indices(table, cells))
 
     def _combine(
         self, bound: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]

@@ -186,6 +186,6 @@ class Record(Encoder):
         self.table = torch.cat([bound, self._absent(bound).expand(self.sensors, 1, self.vsa.dim)], 1)
 
 
-def places(table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
-    """Where in the table each cell is: -1 at the end."""
+def entry_indices(table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
+    """The index of each cell's entry in the table; the last entry is for -1."""
     return torch.where(cells < 0, table.shape[1] - 1, cells)

@@ -253,6 +253,15 @@ def _angles_add_up_under_binding(vsa: VSA) -> None:
     assert_close(vsa.unbind(vsa.bind(x, y), y), x, rtol=1e-4, atol=1e-4)
 
 
+def _a_dim_that_is_not_allowed_is_refused(vsa: VSA) -> None:
+    require(vsa.allows_dim(vsa.dim), f"its own dim, {vsa.dim}, is not allowed")
+    if vsa.name in ARCHITECTURES:
+        config = {key: value for key, value in vsa.config().items() if key != "dim"}
+        for dim in range(max(vsa.dim - 3, 1), vsa.dim + 4):
+            if not vsa.allows_dim(dim):
+                refuses(ValueError, lambda dim=dim: architecture(**config, dim=dim))  # type: ignore[arg-type]
+
+
 def _it_is_made_again_from_its_config(vsa: VSA) -> None:
     require(set(vsa.config()) >= {"name", "dim", "dtype"})
     if vsa.name in ARCHITECTURES:
@@ -260,7 +269,8 @@ def _it_is_made_again_from_its_config(vsa: VSA) -> None:
         again = architecture(**config, dim=vsa.dim)  # type: ignore[arg-type]
         require(again == vsa, f"{again} is not equal")
         require(hash(again) == hash(vsa))
-        require(architecture(**config, dim=vsa.dim + 1) != vsa)  # type: ignore[arg-type]
+        larger = next(filter(vsa.allows_dim, range(vsa.dim + 1, 4 * vsa.dim + 1)), None)
+        require(larger is None or architecture(**config, dim=larger) != vsa)  # type: ignore[arg-type]
 
 
 _LAWS: tuple[Callable[[VSA], None], ...] = (
@@ -291,5 +301,6 @@ _LAWS: tuple[Callable[[VSA], None], ...] = (
     _unbound_norm_is_the_norm_of_the_unbound,
     _a_negative_is_opposite,
     _angles_add_up_under_binding,
+    _a_dim_that_is_not_allowed_is_refused,
     _it_is_made_again_from_its_config,
 )

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from types import TracebackType
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
 from sim.checks import real_number, real_rows, whole_number
 from sim.corral import Arena, Start, build_corral, draw_episode, find_arena
 from sim.robot import ACTUATORS, CONTROL_HZ, HEIGHT, MAX_SPEED, RADIUS, Body, Pose, find_body
@@ -97,7 +97,7 @@ class State:
     outside: NDArray[np.bool_]
 
 
-class Fleet:
+class VectorSim:
     """`size` robots in worlds of their own: give them episodes, command them, read their state.
 
     Robots are addressed by slot. Slots are independent: what happens in one never changes a bit in another.
@@ -164,7 +164,7 @@ class Fleet:
         for world in self.worlds:
             world.close()
 
-    def __enter__(self) -> Fleet:
+    def __enter__(self) -> VectorSim:
         return self
 
     def __exit__(
