@@ -1,4 +1,4 @@
-"""The corral: a simulated robot, its sensors, its teacher, and rollouts of any policy."""
+"""The corral-escape task: a simulated robot with sensors, a teacher, and rollouts of any controller."""
 
 from sim.channel import Channel
 from sim.controller import Controller, ControllerLike, as_controller, replay

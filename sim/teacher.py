@@ -12,30 +12,24 @@ from sim.checks import real_rows
 from sim.sensors import LIGHT_MAX, SENSORS
 
 OBSTACLE = 0.22
-"""An obstacle is sensed below this distance, m. No edge of 16, 20, 24, 32, 48 or 64 equal bins over the sensor's range
-lies on it, so a learner that bins the range equally is not handed the threshold."""
+"""An obstacle is sensed below this distance, m. It is no edge of 16, 20, 24, 32, 48 or 64 equal bins over the sensor's
+range: a learner with equal bins does not get the threshold for free."""
 
-TEACHER_RULES: tuple[str, ...] = (
-    "stay_in_light",
-    "turn_left_to_light",
-    "turn_right_to_light",
-    "avoid_obstacle",
-    "cruise",
-)
-"""The rules in order; the first whose condition holds fires."""
+TEACHER_RULES = ("stay_in_light", "turn_left_to_light", "turn_right_to_light", "avoid_obstacle", "cruise")
+"""Names of the rules, in order. The first one whose condition holds fires."""
 
 BEHAVIOURS: dict[str, tuple[int, ...]] = {"seek_light": (0, 1, 2), "avoid": (3,), "cruise": (4,)}
-"""The behaviours that the rules make up: name -> indices into `TEACHER_RULES`."""
+"""Groups of rules that form a behaviour: name -> indices into `TEACHER_RULES`."""
 
 TEACHER_COMMANDS: NDArray[np.float64] = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
-"""What each rule commands `[5, 2]`: left and right wheel."""
+"""The command of each rule `[5, 2]`: left and right wheel."""
 TEACHER_COMMANDS.flags.writeable = False
 
 
 class Teacher:
-    """The rules as a policy: `teacher(sensors [B, 3]) -> commands [B, 2]`, each command exactly -1 or +1.
+    """The rules as a function: `teacher(sensors [B, 3]) -> commands [B, 2]`, each command exactly -1 or +1.
 
-    Light is sensed where the reading is below `light_below`, an obstacle where it is below `obstacle_below`.
+    Light is sensed if its reading is below `light_below`, an obstacle if the distance is below `obstacle_below`.
     """
 
     def __init__(self, light_below: float = LIGHT_MAX, obstacle_below: float = OBSTACLE) -> None:

@@ -149,10 +149,10 @@ def ones(state: Integers) -> Floats:
         (Answering(lambda state: ones(state) * np.nan), "the policy commanded"),
         (Answering(lambda state: "left"), "commands are of type"),
         (Answering(ones, lambda state: state[1:]), r"shape \(2, 2\); expected one row per robot, 3 in all"),
-        (Answering(ones, lambda state: None), "its structure, types and shapes must stay"),
-        (Answering(ones, lambda state: (state,)), "its structure, types and shapes must stay"),
+        (Answering(ones, lambda state: None), "its structure, types and shapes must not change"),
+        (Answering(ones, lambda state: (state,)), "its structure, types and shapes must not change"),
         (Answering(ones, lambda state: state * 1.0), "float64.*earlier it held.*int64"),
-        (Answering(ones, lambda state: torch.from_numpy(state)), "its structure, types and shapes must stay"),
+        (Answering(ones, lambda state: torch.from_numpy(state)), "its structure, types and shapes must not change"),
         (Answering(ones, lambda state: "state"), "the state holds 'state'; expected arrays or tensors"),
     ],
 )

@@ -233,7 +233,7 @@ def test_a_policy_that_breaks_leaves_no_client() -> None:
         ({"body": "flying"}, "unknown body 'flying'"),
         ({"episodes": []}, "expected at least one whole number"),
         ({"episodes": [0.5]}, "episode 0.5; expected a whole number"),
-        ({"episodes": [3, 1, 3]}, "episode 3 is asked for 2 times"),
+        ({"episodes": [3, 1, 3]}, "episode 3 is given 2 times"),
         ({"episodes": [-2]}, "episode -2"),
         ({"seed": -1}, "seed -1"),
         ({"seconds": 0.0}, "0.0 s; expected"),

@@ -10,7 +10,7 @@ from torchvsa.encoders.record import Record, entry_indices
 
 
 class Sum(Record):
-    """The bundle of the role-bound values. Its kernel **averages** the kernels of the values.
+    """The bundle of the role-bound values. Its kernel is the **mean** of the kernels of the values.
 
     Source: Neubert et al. 2016, Algorithm 1, line 3.
     """

@@ -1,4 +1,4 @@
-"""The laws of the algebra."""
+"""The laws of architectures."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from torchvsa.testing._laws import check, refuses, require, same, seeded
 
 
 def check_architecture(vsa: VSA) -> None:
-    """Check the laws of the algebra on an architecture. Raises `AssertionError` naming the law that it breaks."""
+    """Check the laws of architectures. Raises `AssertionError` that names the first broken law."""
     check(vsa, _LAWS)
 
 
@@ -115,7 +115,7 @@ def _superpose_adds_up(vsa: VSA) -> None:
 def _a_bundle_resembles_its_members_only(vsa: VSA) -> None:
     atoms = _draw(vsa, 10)
     similarity = vsa.similarity(vsa.bundle(atoms[:5]), atoms)
-    # The weakest rule is the majority: of 5 voters each keeps C(4, 2) / 2^4 = 3/8 of the similarity.
+    # The majority keeps the least: for each of 5 summands a similarity of C(4, 2) / 2^4 = 3/8.
     require(similarity[:5].min() > 3 / 8 - _chance(vsa), f"members: {similarity[:5].tolist()}")
     require(similarity[5:].abs().max() < _chance(vsa), f"others: {similarity[5:].tolist()}")
 
@@ -143,7 +143,7 @@ def _bundle_sums_over_any_dimension(vsa: VSA) -> None:
 
 def _integer_weights_repeat_and_zero_weights_leave_out(vsa: VSA) -> None:
     xs = _draw(vsa, 4)
-    # Four votes, and six: architectures that decide by majority meet ties here.
+    # An even number of summands, so that a majority has ties.
     for weights in ([1, 2, 1, 0], [0, 1, 2, 3], [0, 1, 0, 1]):
         repeated = xs.repeat_interleave(torch.tensor(weights), 0)
         assert_close(vsa.bundle(xs, weights=torch.tensor(weights)), vsa.bundle(repeated))
