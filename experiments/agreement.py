@@ -14,12 +14,12 @@ import torch
 from numpy.typing import NDArray
 
 import sim
-from behaviours import Behaviour, Demonstrations, Policy, Space
+from behaviours import Demonstrations, Space
 from behaviours.ordered import distinct_rows
 from experiments.presets import schema
 
 if TYPE_CHECKING:
-    from experiments.controllers import Controller
+    from experiments.controllers import TableRow
 
 
 @dataclass(frozen=True)
@@ -45,32 +45,23 @@ class Agreement:
     by_rule: dict[str, float]
 
 
-def right(policy: sim.Policy, samples: Demonstrations) -> NDArray[np.bool_]:
+def right(policy: sim.ControllerLike, samples: Demonstrations) -> NDArray[np.bool_]:
     """For each sample, whether the policy's commands have the levels of the teacher's, `[N]`.
 
     A controller with a state sees the samples of each episode one after the other, from its start.
     """
-    mind = getattr(policy, "mind", None)
-    if isinstance(mind, Behaviour | Policy):
-        commands = _recalled(mind, samples)
-    else:
-        commands = torch.from_numpy(sim.replay(policy, samples.sensors.numpy(), samples.episodes.numpy()))
+    commands = torch.from_numpy(sim.replay(policy, samples.sensors.numpy(), samples.episodes.numpy()))
     levels = schema()
     return (levels.command_levels(commands) == levels.command_levels(samples.commands)).all(-1).numpy()
 
 
-def share_right(policy: sim.Policy, samples: Demonstrations) -> float:
+def share_right(policy: sim.ControllerLike, samples: Demonstrations) -> float:
     """The share of samples for which `right` holds."""
     return float(right(policy, samples).mean())
 
 
-@torch.no_grad()
-def _recalled(mind: Behaviour | Policy, samples: Demonstrations) -> torch.Tensor:
-    return mind(samples.sensors).commands
-
-
 def measure(
-    controller: Controller,
+    controller: TableRow,
     train: Demonstrations,
     heldout: Demonstrations,
     reference: Space,
@@ -102,7 +93,7 @@ def measure(
         unseen_share=float(unseen.mean()),
         by_rule={
             name: float(heldout_right[fires == rule].mean())
-            for rule, name in enumerate(sim.RULES)
+            for rule, name in enumerate(sim.TEACHER_RULES)
             if (fires == rule).any()
         },
     )

@@ -29,24 +29,27 @@ class Study:
     train: Demonstrations
     fires: NDArray[np.int64]
     """Which of the teacher's rules fired in each row of `train`."""
-    validate: Callable[[sim.Policy], sim.Rollout]
+    validate: Callable[[sim.ControllerLike], sim.Rollout]
     """Drives a candidate from starts that are neither demonstrated nor held out."""
 
 
 @dataclass(frozen=True)
-class Controller:
+class TableRow:
     """One row of the table."""
 
     name: str
-    policy: sim.Policy
-    mind: Behaviour | Policy | None = None
-    """The program behind the policy, where hypervectors do the driving."""
+    policy: sim.ControllerLike
     pairs: int | None = None
     body: str | None = None
     """The robot's body, if not that of the run."""
     reports: dict[str, LearningReport] = field(default_factory=dict)
     tried: list[dict[str, float]] = field(default_factory=list)
     """What was compared to choose this controller's settings."""
+
+    @property
+    def mind(self) -> Behaviour | Policy | None:
+        """The policy where it drives by hypervectors, else None."""
+        return self.policy if isinstance(self.policy, Behaviour | Policy) else None
 
     @property
     def space(self) -> Space | None:
@@ -57,18 +60,6 @@ class Controller:
     def bins(self) -> int | None:
         """Bins per sensor, if readings are binned."""
         return None if self.space is None else self.space.encoder.bins
-
-
-class Recalled:
-    """A learned program as a policy of the simulator."""
-
-    def __init__(self, mind: Behaviour | Policy) -> None:
-        self.mind = mind
-
-    @torch.no_grad()
-    def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Commands `[B, 2]` for readings `[B, 3]`."""
-        return self.mind(sensors).commands.numpy()
 
 
 class Classified:
@@ -103,20 +94,20 @@ def _uniform(generator: np.random.Generator, rows: int) -> NDArray[np.float64]:
     return generator.uniform(-1, 1, (rows, len(sim.ACTUATORS)))
 
 
-def _teacher(study: Study) -> Controller:
-    return Controller("teacher", sim.Teacher())
+def _teacher(study: Study) -> TableRow:
+    return TableRow("teacher", sim.Teacher())
 
 
-def _teacher_wheeled(study: Study) -> Controller:
-    return Controller("teacher_wheeled", sim.Teacher(), body="wheeled")
+def _teacher_wheeled(study: Study) -> TableRow:
+    return TableRow("teacher_wheeled", sim.Teacher(), body="wheeled")
 
 
-def _default(study: Study) -> Controller:
+def _default(study: Study) -> TableRow:
     """The rule and the codebooks of this run's settings."""
     return _learned("default", presets.rule(study.config["rule"]).fit(study.space, study.train))
 
 
-def _paper(study: Study, bins: int | None = None, name: str = "paper") -> Controller:
+def _paper(study: Study, bins: int | None = None, name: str = "paper") -> TableRow:
     """The printed algorithms read literally, at the bins of the default."""
     bins = study.config["encoder"]["bins"] if bins is None else bins
     space = presets.space(study.config["vsa"], study.config["paper"], study.config["seed"], bins)
@@ -124,7 +115,7 @@ def _paper(study: Study, bins: int | None = None, name: str = "paper") -> Contro
     return _learned(name, behaviour)
 
 
-def _paper_best_bins(study: Study) -> Controller:
+def _paper_best_bins(study: Study) -> TableRow:
     """The same at the bins with the highest success on validation starts (then agreement; then the fewest)."""
     choices = sorted({*study.config["paper_bins"], study.config["encoder"]["bins"]})
     candidates = [_paper(study, bins, "paper_best_bins") for bins in choices]
@@ -138,10 +129,10 @@ def _paper_best_bins(study: Study) -> Controller:
     ]
     order = [(row["validation_success"], row["train_agreement"]) for row in tried]
     best = candidates[order.index(max(order))]
-    return Controller(best.name, best.policy, best.mind, best.pairs, reports=best.reports, tried=tried)
+    return TableRow(best.name, best.policy, best.pairs, reports=best.reports, tried=tried)
 
 
-def _bundled(study: Study) -> Controller:
+def _bundled(study: Study) -> TableRow:
     """Three behaviours, each learned alone where its own rules fire, combined without any further training."""
     bank = BehaviourBank(study.space)
     for name, rules in sim.BEHAVIOURS.items():
@@ -152,32 +143,32 @@ def _bundled(study: Study) -> Controller:
     policy = presets.policy(bank, study.config["composition"])
     reports = {name: bank[name].report for name in bank}
     pairs = sum(report.pairs for report in reports.values())
-    return Controller("bundled", Recalled(policy), policy, pairs, reports=reports)
+    return TableRow("bundled", policy, pairs, reports=reports)
 
 
-def _hand_written(study: Study) -> Controller:
+def _hand_written(study: Study) -> TableRow:
     vsa = torchvsa.architecture(**study.config["vsa"])
     return _learned("hand_written", hand_written.behaviour(vsa, study.config["seed"]))
 
 
-def _nearest_neighbour(study: Study) -> Controller:
-    return Controller("nearest_neighbour", Classified(KNeighborsClassifier(1), study.train), pairs=len(study.train))
+def _nearest_neighbour(study: Study) -> TableRow:
+    return TableRow("nearest_neighbour", Classified(KNeighborsClassifier(1), study.train), pairs=len(study.train))
 
 
-def _decision_tree(study: Study) -> Controller:
+def _decision_tree(study: Study) -> TableRow:
     model = DecisionTreeClassifier(random_state=study.config["seed"])
-    return Controller("decision_tree", Classified(model, study.train))
+    return TableRow("decision_tree", Classified(model, study.train))
 
 
-def _random(study: Study) -> Controller:
-    return Controller("random", RandomCommands(study.config["seed"]))
+def _random(study: Study) -> TableRow:
+    return TableRow("random", RandomCommands(study.config["seed"]))
 
 
-def _learned(name: str, behaviour: Behaviour) -> Controller:
-    return Controller(name, Recalled(behaviour), behaviour, behaviour.report.pairs, reports={name: behaviour.report})
+def _learned(name: str, behaviour: Behaviour) -> TableRow:
+    return TableRow(name, behaviour, behaviour.report.pairs, reports={name: behaviour.report})
 
 
-CONTROLLERS: dict[str, Callable[[Study], Controller]] = {
+CONTROLLERS: dict[str, Callable[[Study], TableRow]] = {
     "teacher": _teacher,
     "default": _default,
     "paper": _paper,

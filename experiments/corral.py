@@ -28,7 +28,7 @@ from experiments import hand_written, presets
 from experiments.agreement import Agreement, measure
 from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
-from experiments.controllers import CONTROLLERS, Controller, Study
+from experiments.controllers import CONTROLLERS, Study, TableRow
 from experiments.driving import Driver, progress_bars, workers
 from experiments.lessons import FIRST_DEMONSTRATION, FIRST_VALIDATION, from_file, shown_in
 from experiments.results import Results, Row
@@ -110,7 +110,7 @@ def study(config: dict[str, Any], folder: Path, console: Console) -> Results:
     return results
 
 
-def _bank(space: Space, controllers: Mapping[str, Controller]) -> BehaviourBank:
+def _bank(space: Space, controllers: Mapping[str, TableRow]) -> BehaviourBank:
     """What was learned over the run's codebooks: the default, and the behaviours that were bundled."""
     bank = BehaviourBank(space)
     for name, controller in controllers.items():
@@ -128,7 +128,7 @@ def _starts(config: Mapping[str, Any], name: str) -> int:
     return config["starts"] if name in ("teacher", "default", "bundled") else config["other_starts"]
 
 
-def _query_seconds(policy: sim.Policy, readings: np.ndarray, calls: int = 200) -> float:
+def _query_seconds(policy: sim.ControllerLike, readings: np.ndarray, calls: int = 200) -> float:
     """Median time of one answer to one robot, over readings that the teacher met."""
     rows = readings[np.linspace(0, len(readings) - 1, calls).astype(int)]
     controller = sim.as_controller(policy)
@@ -141,7 +141,7 @@ def _query_seconds(policy: sim.Policy, readings: np.ndarray, calls: int = 200) -
     return statistics.median(times)
 
 
-def _row(controller: Controller, rollout: sim.Rollout, agreement: Agreement, query_us: float) -> Row:
+def _row(controller: TableRow, rollout: sim.Rollout, agreement: Agreement, query_us: float) -> Row:
     row = {
         **asdict(rollout.summary()),
         "controller": controller.name,
@@ -176,7 +176,7 @@ def _metrics(
     table: list[Row],
     rollouts: Mapping[str, sim.Rollout],
     agreements: Mapping[str, Agreement],
-    controllers: Mapping[str, Controller],
+    controllers: Mapping[str, TableRow],
 ) -> dict[str, float | None]:
     """Every number of the table as `controller.column`, and what the table has no room for."""
     metrics: dict[str, float | None] = {}

@@ -16,7 +16,7 @@ from behaviours.storage import write_atomically
 from experiments import corral_tables, corral_text, figures
 from experiments.agreement import Agreement
 from experiments.command_map import SLICES, command_map
-from experiments.controllers import Controller
+from experiments.controllers import TableRow
 from experiments.failures import failures, on_the_edge
 from experiments.forgetting import ABOUT, Recalled, learners, recalled
 from experiments.report import Page, Section
@@ -45,7 +45,7 @@ class CorralRun:
 
     folder: Path
     results: Results
-    controllers: Mapping[str, Controller]
+    controllers: Mapping[str, TableRow]
     rollouts: Mapping[str, sim.Rollout]
     agreements: Mapping[str, Agreement]
     train: Demonstrations
@@ -67,7 +67,7 @@ class CorralRun:
 def write_report(
     folder: Path,
     results: Results,
-    controllers: Mapping[str, Controller],
+    controllers: Mapping[str, TableRow],
     rollouts: Mapping[str, sim.Rollout],
     agreements: Mapping[str, Agreement],
     train: Demonstrations,

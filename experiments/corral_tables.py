@@ -135,10 +135,10 @@ def tried_table(tried: Sequence[Mapping[str, float]]) -> Table:
 
 def rules_table(agreements: Mapping[str, Agreement], edges: Mapping[str, float | None]) -> Table:
     """Agreement by the teacher's rule, and how much of the rest lies on the edge of a threshold."""
-    columns = ["controller", *(rule.replace("_", " ") for rule in sim.RULES), "differs", "on the edge"]
+    columns = ["controller", *(rule.replace("_", " ") for rule in sim.TEACHER_RULES), "differs", "on the edge"]
     rows: list[list[str | Cell]] = []
     for name, agreement in agreements.items():
-        shares = [agreement.by_rule.get(rule) for rule in sim.RULES]
+        shares = [agreement.by_rule.get(rule) for rule in sim.TEACHER_RULES]
         cells = [Cell(number(share), "bad" if share is not None and share < 0.5 else "") for share in shares]
         rows.append([name, *cells, number(1 - agreement.heldout), number(edges[name])])
     return columns, rows

@@ -64,7 +64,7 @@ class Tree(Learner):
 
     def __init__(self, train: Demonstrations, seed: int) -> None:
         self.classes, labels = np.unique(train.commands.numpy(), axis=0, return_inverse=True)
-        self.low, high = (np.array([sensor[end] for sensor in sim.SENSORS]) for end in (1, 2))
+        self.low, high = np.array([(sensor.low, sensor.high) for sensor in sim.SENSORS]).T
         self.span = high - self.low
         places = (train.sensors.numpy() - self.low) / self.span
         self.model = DecisionTreeClassifier(random_state=seed).fit(places, labels.ravel())

@@ -22,7 +22,7 @@ class Driver:
         self.arena = presets.arena(config["arena"])
 
     def drive(
-        self, what: str, policy: sim.Policy, episodes: range, body: str | None = None, record: bool = False
+        self, what: str, policy: sim.ControllerLike, episodes: range, body: str | None = None, record: bool = False
     ) -> sim.Rollout:
         """Drive `policy` from the starts of `episodes`."""
         task = self.progress.add_task(what, total=len(episodes))
@@ -43,7 +43,7 @@ class Driver:
 
 def drive_here(
     config: Mapping[str, Any],
-    policy: sim.Policy,
+    policy: sim.ControllerLike,
     episodes: Iterable[int],
     arena: str | sim.Arena = "default",
     record: bool = False,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import sim
 from behaviours import Behaviour, Demonstrations, Policy
 from experiments.command_map import COMMANDS, kinds
-from sim.teacher import COMMANDS as TEACHER_COMMANDS
+from sim.teacher import TEACHER_COMMANDS
 
 PLACES = ("inside the corral", "outside, away from the lamp", "at the lamp, not long enough")
 """Where a robot that did not succeed can be at the end."""
@@ -69,7 +69,9 @@ def failures(rollout: sim.Rollout) -> Failures:
     mistakes = []
     for which, command in np.unique(np.stack([rule[wrong], given[wrong]], 1), axis=0).tolist():
         at = wrong & (rule == which) & (given == command)
-        mistakes.append(Mistake(sim.RULES[which], COMMANDS[command], float(at.mean()), np.median(sensors[at], axis=0)))
+        mistakes.append(
+            Mistake(sim.TEACHER_RULES[which], COMMANDS[command], float(at.mean()), np.median(sensors[at], axis=0))
+        )
     return Failures(
         rollout.episode[failed],
         {name: int((place == index).sum()) for index, name in enumerate(PLACES)},

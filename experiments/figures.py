@@ -43,7 +43,7 @@ CONTROLLER_COLOURS = {
     "teacher_wheeled": "#5B6875",
 }
 COMMAND_COLOURS = dict(zip(COMMANDS, ("#A9D3EE", "#F2C14E", "#D58FB5", "#D0D5DA"), strict=True))
-RULE_COLOURS = dict(zip(sim.RULES, ("#FFF3A8", "#F8D9A0", "#EFC7DC", "#F3B79A", "#DCEBF7"), strict=True))
+RULE_COLOURS = dict(zip(sim.TEACHER_RULES, ("#FFF3A8", "#F8D9A0", "#EFC7DC", "#F3B79A", "#DCEBF7"), strict=True))
 LEARNER_COLOURS = {PRINTED: VERMILION, CLIPPED: ORANGE, MEAN: SKY, SUM: GREEN, DEFAULT: BLUE}
 LEARNER_MARKERS = {PRINTED: "v", CLIPPED: "o", MEAN: "^", SUM: "s", DEFAULT: "D"}
 
@@ -164,8 +164,8 @@ def command_maps(maps: Mapping[str, Sequence[CommandMap]]) -> Figure:
 
 def _map(axes: Axes, command: CommandMap, who: str) -> None:
     plane, bins = command.plane, command.bins
-    (x_name, x_low, x_high, x_unit), (y_name, y_low, y_high, y_unit) = sim.SENSORS[plane.x], sim.SENSORS[plane.y]
-    box = (x_low, x_high, y_low, y_high)
+    x, y = sim.SENSORS[plane.x], sim.SENSORS[plane.y]
+    box = (x.low, x.high, y.low, y.high)
     shown = command.teacher if who == "teacher" else command.learned
     axes.imshow(
         shown,
@@ -177,12 +177,12 @@ def _map(axes: Axes, command: CommandMap, who: str) -> None:
         vmax=len(COMMANDS) - 0.5,
         interpolation="nearest",
     )
-    x_edges, y_edges = np.linspace(x_low, x_high, bins + 1), np.linspace(y_low, y_high, bins + 1)
+    x_edges, y_edges = np.linspace(x.low, x.high, bins + 1), np.linspace(y.low, y.high, bins + 1)
     if who != "teacher" and command.differs.any():
         wide, high = float(x_edges[1] - x_edges[0]), float(y_edges[1] - y_edges[0])
         cells = [
             Path.unit_rectangle().transformed(
-                Affine2D().translate(column, row).scale(wide, high).translate(x_low, y_low)
+                Affine2D().translate(column, row).scale(wide, high).translate(x.low, y.low)
             )
             for row, column in np.argwhere(command.differs).tolist()
         ]
@@ -194,12 +194,12 @@ def _map(axes: Axes, command: CommandMap, who: str) -> None:
     if len(size):
         # The area grows with the logarithm, or the few cells of the straight runs would hide all others.
         area = 1.5 + 14 * np.log1p(size) / np.log1p(size.max())
-        x, y = (x_edges[:-1] + x_edges[1:]) / 2, (y_edges[:-1] + y_edges[1:]) / 2
-        axes.scatter(x[columns], y[rows], area, color=BLACK, linewidths=0, zorder=3)
+        x_middles, y_middles = (x_edges[:-1] + x_edges[1:]) / 2, (y_edges[:-1] + y_edges[1:]) / 2
+        axes.scatter(x_middles[columns], y_middles[rows], area, color=BLACK, linewidths=0, zorder=3)
     if plane.y == DISTANCE:
         axes.axhline(OBSTACLE, color=BLACK, linewidth=0.8, linestyle=":")
-    axes.set_xlabel(f"{x_name.replace('_', ' ')} ({x_unit})")
-    axes.set_ylabel(f"{y_name.replace('_', ' ')} ({y_unit})")
+    axes.set_xlabel(f"{x.name.replace('_', ' ')} ({x.unit})")
+    axes.set_ylabel(f"{y.name.replace('_', ' ')} ({y.unit})")
 
 
 @_styled
@@ -214,7 +214,7 @@ def timelines(lines: Sequence[Timeline]) -> Figure:
             _bands(axes, line)
         readings.set_title(f"{line.name}, held-out start {line.episode}")
         for index, (colour, style) in enumerate(((VERMILION, "-"), (BLUE, "-"), (BLACK, "--"))):
-            name = sim.SENSORS[index][0].replace("_", " ")
+            name = sim.SENSORS[index].name.replace("_", " ")
             readings.plot(line.seconds, line.sensors[:, index], style, color=colour, linewidth=1.2, label=name)
         readings.set_ylabel("readings (m)")
         answer.plot(line.seconds, line.similarity, color=BLACK, linewidth=1.2, label="similarity to the winning result")
@@ -240,7 +240,7 @@ def _bands(axes: Axes, line: Timeline) -> None:
     begins = np.flatnonzero(np.diff(line.rule, prepend=-1))
     ends = np.append(line.seconds[begins[1:]], line.seconds[-1] + 1 / sim.CONTROL_HZ)
     spans = np.stack([line.seconds[begins], ends - line.seconds[begins]], axis=1)
-    for index, rule in enumerate(sim.RULES):
+    for index, rule in enumerate(sim.TEACHER_RULES):
         own = spans[line.rule[begins] == index].tolist()
         across = axes.get_xaxis_transform()
         axes.broken_barh(own, (0, 1), transform=across, color=RULE_COLOURS[rule], linewidth=0, zorder=0)

@@ -26,7 +26,7 @@ from behaviours.ordered import distinct_rows
 from experiments import presets
 from experiments.agreement import right
 from experiments.choices import check_chosen
-from experiments.controllers import Classified, Recalled
+from experiments.controllers import Classified
 from experiments.driving import drive_here, pooled_success
 from experiments.jobs import run_jobs
 from experiments.lessons import FIRST_DEMONSTRATION, shown_in
@@ -186,7 +186,7 @@ def learn_and_ask(
     if isinstance(learner, Combination):
         space = _space(own, config["vsa"], learner, seed)
         with no_convergence_warnings():  # the agreement says it
-            policy = Recalled(presets.rule(own["options"]["rule"][learner.rule]).fit(space, shown))
+            policy = presets.rule(own["options"]["rule"][learner.rule]).fit(space, shown)
         changed = learner.changes(default)
     else:
         space = _space(own, config["vsa"], default, seed)
@@ -205,7 +205,7 @@ def learn_and_ask(
     return rows
 
 
-def _agreement(policy: sim.Policy, space: Space, lesson: Lesson, examined: Lesson) -> Row:
+def _agreement(policy: sim.ControllerLike, space: Space, lesson: Lesson, examined: Lesson) -> Row:
     """Shares of held-out samples commanded as the teacher does: of all, and of conditions that were never met.
 
     The conditions of all learners, rivals included, are told apart at the same bins.

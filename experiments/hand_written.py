@@ -17,7 +17,7 @@ from behaviours.ordered import distinct_rows
 from experiments.largest_margin import largest_margin, margin, whole
 from experiments.presets import schema as learners_schema
 from sim.sensors import LIGHT_MAX
-from sim.teacher import COMMANDS, OBSTACLE
+from sim.teacher import OBSTACLE, TEACHER_COMMANDS
 from torchvsa import VSA
 from torchvsa.encoders import Lookup, Sum
 
@@ -31,7 +31,10 @@ RULES: tuple[tuple[int, int, int], ...] = (
     (NO, NO, YES),  # avoid obstacle
     (NO, NO, NO),  # cruise
 )
-"""(light left, light right, obstacle), in the order of `sim.RULES`. Each of the 8 cases fulfils exactly one of them."""
+"""(light left, light right, obstacle), in the order of `sim.TEACHER_RULES`.
+
+Each of the 8 cases fulfils exactly one of them.
+"""
 
 CASES: tuple[tuple[int, ...], ...] = tuple(product((YES, NO), repeat=3))
 """All that the three thresholds can tell apart."""
@@ -56,8 +59,8 @@ def space(vsa: VSA, seed: int) -> Space:
     thresholds = (LIGHT_MAX, LIGHT_MAX, OBSTACLE)
     sensors = [
         # The reading at a light sensor's maximum is the first that counts as dark.
-        Sensor(name, 0.0, 2 * threshold, unit, beyond="clip")
-        for (name, _, _, unit), threshold in zip(sim.SENSORS, thresholds, strict=True)
+        Sensor(sensor.name, 0.0, 2 * threshold, sensor.unit, beyond="clip")
+        for sensor, threshold in zip(sim.SENSORS, thresholds, strict=True)
     ]
     schema = Schema(sensors, learners_schema().actuators)
     return Space(schema, Sum(Lookup(vsa, bins=2), len(sensors)), seed=seed)
@@ -70,7 +73,9 @@ def behaviour(vsa: VSA, seed: int) -> Behaviour:
     """
     codes = space(vsa, seed)
     conditions, cases = codes.encode(torch.tensor(RULES)), codes.encode(torch.tensor(CASES))
-    results, result_of = distinct_rows(codes.schema.command_levels(COMMANDS))  # avoid and cruise repeat a command
+    results, result_of = distinct_rows(
+        codes.schema.command_levels(TEACHER_COMMANDS)
+    )  # avoid and cruise repeat a command
     right = result_of[[_fires(case) for case in CASES]]
     items = codes.items(results)
     pairs = vsa.bind(items[result_of], conditions)

@@ -20,9 +20,9 @@ from experiments import draws
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-NAMES = [name for name, *_ in sim.SENSORS]
-LOW = np.array([low for _, low, _, _ in sim.SENSORS])
-HIGH = np.array([high for _, _, high, _ in sim.SENSORS])
+NAMES = [sensor.name for sensor in sim.SENSORS]
+LOW = np.array([sensor.low for sensor in sim.SENSORS])
+HIGH = np.array([sensor.high for sensor in sim.SENSORS])
 
 STUCK_WITHIN = 10.0
 """A sensor that gets stuck does so within this time from the start, s: about as long as a run of the teacher takes."""
@@ -209,7 +209,7 @@ class Aliased(Disturbance):
 class Disturbed:
     """A controller that sees its sensors through a disturbance only; its state is the pair of both states."""
 
-    def __init__(self, disturbance: Disturbance, policy: sim.Policy) -> None:
+    def __init__(self, disturbance: Disturbance, policy: sim.ControllerLike) -> None:
         self.disturbance, self.controller = disturbance, sim.as_controller(policy)
 
     def start(self, episodes: Integers) -> tuple[Any, Any]:

@@ -20,8 +20,11 @@ COMMAND_LEVELS = 3
 def schema(beyond: Literal["error", "clip"] = "clip") -> Schema:
     """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
     return Schema(
-        [Sensor(name, low, high, unit, beyond) for name, low, high, unit in sim.SENSORS],
-        [Actuator(name, low, high, unit, levels=COMMAND_LEVELS) for name, low, high, unit in sim.ACTUATORS],
+        [Sensor(channel.name, channel.low, channel.high, channel.unit, beyond) for channel in sim.SENSORS],
+        [
+            Actuator(channel.name, channel.low, channel.high, channel.unit, levels=COMMAND_LEVELS)
+            for channel in sim.ACTUATORS
+        ],
     )
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import sim
 from behaviours import Behaviour, Policy
 from experiments.command_map import kinds
-from sim.teacher import COMMANDS as TEACHER_COMMANDS
+from sim.teacher import TEACHER_COMMANDS
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Timeline:
         episode: its number.
         seconds: since the start.
         sensors: `[N, 3]`.
-        rule: the teacher's rule that would fire, an index into `sim.RULES`.
+        rule: the teacher's rule that would fire, an index into `sim.TEACHER_RULES`.
         differs: whether the command was another than the teacher's.
         similarity, margin, familiarity: of the recall; the margin is NaN where the program knows one result only.
         speaker: which behaviour answered, an index into `voices`; None for a single behaviour.

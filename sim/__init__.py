@@ -1,7 +1,7 @@
-"""The corral: a simulated robot, its sensors, its teacher, and rollouts of any policy."""
+"""The corral-escape task: a simulated robot with sensors, a teacher, and rollouts of any controller."""
 
-import sim.quiet  # noqa: F401 (before anything that imports pybullet)
-from sim.controller import Controller, Policy, as_controller, replay
+from sim.channel import Channel
+from sim.controller import Controller, ControllerLike, as_controller, replay
 from sim.corral import ARENAS, Arena, Start, draw_start
 from sim.env import CorralEscapeEnv, CorralEscapeVectorEnv, register
 from sim.result import Rollout, Steps, Summary
@@ -9,7 +9,7 @@ from sim.robot import ACTUATORS, BODIES, CONTROL_HZ
 from sim.rollout import rollout
 from sim.sensors import SENSORS
 from sim.statistics import wilson
-from sim.teacher import BEHAVIOURS, RULES, Teacher
+from sim.teacher import BEHAVIOURS, TEACHER_RULES, Teacher
 
 __all__ = [
     "ACTUATORS",
@@ -17,13 +17,14 @@ __all__ = [
     "BEHAVIOURS",
     "BODIES",
     "CONTROL_HZ",
-    "RULES",
     "SENSORS",
+    "TEACHER_RULES",
     "Arena",
+    "Channel",
     "Controller",
+    "ControllerLike",
     "CorralEscapeEnv",
     "CorralEscapeVectorEnv",
-    "Policy",
     "Rollout",
     "Start",
     "Steps",

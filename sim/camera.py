@@ -1,18 +1,18 @@
-"""Pictures of a pybullet client, rendered in software: no display, no OpenGL."""
+"""Pictures of a pybullet world, rendered in software: they need neither a display nor OpenGL."""
 
 from __future__ import annotations
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
 from sim.corral import Arena
 
 
-def photograph(client: int, arena: Arena, width: int = 480, height: int = 360) -> NDArray[np.uint8]:
-    """The whole scene of `client` from obliquely above, `[height, width, 3]` uint8.
+def render_rgb(client: int, arena: Arena, width: int = 480, height: int = 360) -> NDArray[np.uint8]:
+    """Render the world of `client` from obliquely above as `[height, width, 3]` uint8; the lamp is on the right.
 
-    The lamp is to the right. Raises `ValueError` for a size below 1 pixel.
+    Raises `ValueError` for a size below 1 pixel.
     """
     if width < 1 or height < 1:
         raise ValueError(f"a picture of {width} x {height} pixels; expected at least 1 x 1")

@@ -1,4 +1,4 @@
-"""Checks of what callers give: whole numbers, and numbers in rows."""
+"""Check arguments: whole numbers, real numbers, and arrays of real numbers."""
 
 from __future__ import annotations
 
@@ -8,23 +8,23 @@ from numbers import Real
 import numpy as np
 from numpy.typing import NDArray
 
-_MOST = 2**63 - 1
-"""Seeds and episodes are kept in columns of int64."""
+_MAX = 2**63 - 1
+"""Seeds and episodes are stored as int64."""
 
 
 def whole_number(name: str, value: object, at_least: int = 0) -> int:
-    """`value` as a plain integer. Raises `ValueError` unless it is a whole number from `at_least` to 2^63 - 1."""
+    """`value` as an int. Raises `ValueError` unless it is a whole number from `at_least` to 2^63 - 1."""
     try:
         number = at_least - 1 if isinstance(value, bool | np.bool_) else operator.index(value)  # pyright: ignore[reportArgumentType]
     except TypeError:
         number = at_least - 1
-    if not at_least <= number <= _MOST:
+    if not at_least <= number <= _MAX:
         raise ValueError(f"{name} {value!r}; expected a whole number, {at_least} or more (and less than 2^63)")
     return number
 
 
 def real_number(name: str, value: object) -> float:
-    """`value` as a float. Raises `ValueError` for anything but a real number."""
+    """`value` as a float. Raises `ValueError` unless it is a real number."""
     if isinstance(value, bool | np.bool_) or not isinstance(value, Real):
         raise ValueError(f"{name} {value!r}; expected a real number")
     return float(value)

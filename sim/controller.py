@@ -1,4 +1,4 @@
-"""What drives robots: controllers, whose memory is an explicit state, and plain functions from readings to commands."""
+"""What can drive robots: controllers with an explicit state, and plain functions from readings to commands."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from sim.state import check_alike, check_rows, is_empty, join, rows_of
 
 @runtime_checkable
 class Controller(Protocol):
-    """Drives a batch of robots, like an RNN cell: `step` takes a state and returns the next one.
+    """Drives a batch of robots. Works like an RNN cell: `step` takes a state and returns the next one.
 
-    Everything that a controller remembers about an episode is in the state; the instance itself does not change.
-    The state is a NumPy array or a tensor with one row per robot, a tuple, list or dictionary of those, or None for
-    no memory; its structure, types and shapes stay the same. Rows are independent robots: those of finished episodes
-    are dropped, new ones are added, and their order may change between two steps. With several workers the controller
-    must be picklable.
+    All memory of an episode is in the state; the instance itself does not change. The state is a NumPy array or a
+    tensor with one row per robot, a tuple, list or dictionary of those, or None for no memory. Its structure, types and
+    shapes stay the same. Each row is one robot, independent of the others: between two steps, rows of finished episodes
+    are dropped, rows of new ones are added, and the order may change. With several workers the controller must be
+    picklable.
 
         class Accelerating:
             def start(self, episodes):
@@ -35,24 +35,24 @@ class Controller(Protocol):
     def start(self, episodes: NDArray[np.int64], /) -> Any:
         """The state `[B, ...]` at the beginning of these episodes `[B]`.
 
-        Random numbers should be drawn from a seed and the number of the episode: then they are the same in any batch.
+        Seed random numbers with the number of the episode; then they are the same in any batch.
         """
         ...
 
     def step(self, readings: NDArray[np.float64], state: Any, /) -> tuple[Any, Any]:
         """The answer to readings `[B, n]`, and the next state.
 
-        The answer is an array or a tensor of commands `[B, m]`, or an object that has them as `.commands`.
+        The answer is an array or a tensor of commands `[B, m]`, or an object whose attribute `commands` is one.
         """
         ...
 
 
-Policy = Controller | Callable[[Any], Any]
-"""What can drive: a controller; or, without memory, a function or `nn.Module` from readings `[B, n]` to an answer."""
+ControllerLike = Controller | Callable[[Any], Any]
+"""A controller; or, without memory, a function or `nn.Module` from readings `[B, n]` to an answer."""
 
 
 class _Stateless:
-    """A function of the readings as a controller."""
+    """A controller without state that calls a function of the readings."""
 
     def __init__(self, function: Callable[[Any], Any]) -> None:
         self.function = function
@@ -65,10 +65,10 @@ class _Stateless:
         return self.function(readings), state
 
 
-def as_controller(policy: Policy) -> Controller:
-    """`policy` itself if it is a controller, else the function as one without state.
+def as_controller(policy: ControllerLike) -> Controller:
+    """Return a controller as it is, and wrap a function in a controller without state.
 
-    Raises `TypeError` for what is neither.
+    Raises `TypeError` for anything else.
     """
     if isinstance(policy, Controller) and not isinstance(policy, type):
         return policy
@@ -81,72 +81,77 @@ def as_controller(policy: Policy) -> Controller:
 
 
 def begin(controller: Controller, episodes: NDArray[np.int64]) -> Any:
-    """`controller.start(episodes)`. Raises `ValueError`, naming an episode, unless it has one row per episode."""
+    """Call `controller.start(episodes)`. Raises `ValueError` unless the state has one row per episode."""
     state = controller.start(episodes.copy())
     _checked(f"episode {episodes[0]}, start", check_rows, state, len(episodes))
     return state
 
 
 def append(controller: Controller, state: Any, episodes: NDArray[np.int64]) -> Any:
-    """`state` with more robots at its end, which begin `episodes`."""
+    """Append the states of robots that begin `episodes`."""
     more = begin(controller, episodes)
     _checked(f"episode {episodes[0]}, start", check_alike, more, state)
     return join(state, more)
 
 
 def advance(controller: Controller, readings: NDArray[np.float64], state: Any, where: str) -> tuple[Any, Any]:
-    """The commands, as something that NumPy can read but unchecked, and the next state; `where` begins errors.
+    """Call `controller.step` and return the commands, unchecked but readable by NumPy, and the next state.
 
-    Raises `ValueError` if the next state is not built like `state`, `TypeError` if `step` does not return a pair.
+    Error messages begin with `where`. Raises `ValueError` if the structure of the state changes, and `TypeError` if
+    `step` does not return a pair.
     """
-    # The controller gets a copy: what it does to its readings must not change the record.
+    # A controller that writes into its readings must not change the record.
     pair = controller.step(readings.copy(), state)
     if not isinstance(pair, tuple) or len(pair) != 2:
         raise TypeError(f"{where}: `step` returned {type(pair).__name__}; expected the pair (answer, state)")
-    answer, after = pair
-    if after is not state:
-        _checked(where, check_rows, after, len(readings))
-        _checked(where, check_alike, after, state)
-    return _plain(answer), after
+    answer, following = pair
+    if following is not state:
+        _checked(where, check_rows, following, len(readings))
+        _checked(where, check_alike, following, state)
+    return _plain(answer), following
 
 
-def replay(policy: Policy, readings: NDArray[np.float64], episodes: NDArray[np.int64]) -> NDArray[Any]:
-    """What a policy answers to recorded readings `[N, n]`, `[N, ...]`, as if it had been there from the start.
+def replay(policy: ControllerLike, readings: NDArray[np.float64], episodes: NDArray[np.int64]) -> NDArray[Any]:
+    """The answers `[N, ...]` of a controller that is fed recorded readings from the start of each episode.
 
-    `episodes` `[N]` says which episode each row is of; the rows of an episode are its steps from 0 on, in this order.
-    What has no state is asked about all rows at once.
+    A controller without state gets all rows at once.
+
+    Args:
+        policy: A controller or a function.
+        readings: `[N, n]`.
+        episodes: `[N]`, the episode of each row. The rows of an episode are its steps, in order, from step 0 on.
     """
     controller = as_controller(policy)
     order = np.argsort(episodes, kind="stable")
     numbers, first, lengths = np.unique(episodes[order], return_index=True, return_counts=True)
-    # The longest episodes first, so that those that still run are always the first rows.
+    # The longest episodes first, so that the running ones are always the first rows.
     longest = np.argsort(-lengths, kind="stable")
     numbers, first, lengths = numbers[longest], first[longest], lengths[longest]
-    state, going = begin(controller, numbers), len(numbers)
+    state, robots = begin(controller, numbers), len(numbers)
     if is_empty(state):
         state = begin(controller, episodes)
         return np.asarray(advance(controller, readings, state, f"episode {episodes[0]}, step 0")[0])
-    places, answers = [], []
+    rows, answers = [], []
     for step in range(int(lengths[0])):
-        left = int(np.count_nonzero(lengths > step))
-        if left < going:
-            state, going = rows_of(state, slice(left)), left
-        places.append(order[first[:going] + step])
-        answer, state = advance(controller, readings[places[-1]], state, f"episode {numbers[0]}, step {step}")
+        running = int(np.count_nonzero(lengths > step))
+        if running < robots:
+            state, robots = rows_of(state, slice(running)), running
+        rows.append(order[first[:running] + step])
+        answer, state = advance(controller, readings[rows[-1]], state, f"episode {numbers[0]}, step {step}")
         answers.append(np.asarray(answer))
     result = np.concatenate(answers)
-    result[np.concatenate(places)] = result.copy()
+    result[np.concatenate(rows)] = result.copy()
     return result
 
 
 def _plain(answer: Any) -> Any:
-    """The commands of an answer, as what NumPy can read."""
+    """The commands of an answer, in a form that NumPy can read."""
     commands = getattr(answer, "commands", answer)
     return commands.detach().cpu() if hasattr(commands, "detach") else commands
 
 
-def _checked(where: str, check: Callable[..., None], *given: Any) -> None:
+def _checked(where: str, check: Callable[..., None], *arguments: Any) -> None:
     try:
-        check(*given)
+        check(*arguments)
     except ValueError as error:
         raise ValueError(f"{where}: {error}") from error

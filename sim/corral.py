@@ -1,7 +1,7 @@
 """The world: a square corral with one gap, and a lamp outside it.
 
-The corral is centred on the origin; its inner faces lie at x, y = ±side/2. The gap is centred in the wall at
-x = +side/2, and the lamp stands beyond it. Lengths are in metres, angles in radians (0 along +x, counter-clockwise).
+The corral is centred on the origin; its inner faces are at x, y = ±side/2. The gap is in the wall at x = +side/2, and
+the lamp is beyond it. Lengths are in metres, angles in radians (0 along +x, counter-clockwise).
 """
 
 from __future__ import annotations
@@ -10,22 +10,22 @@ import math
 from dataclasses import dataclass, fields
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
 from sim.checks import whole_number
 
 WALL_GROUP, WALL_MASK = 1, 3
-"""Walls, lamp and floor collide with everything; `rayTestBatch` with a mask misses them otherwise."""
+"""Walls, lamp and floor collide with everything. With other values `rayTestBatch` with a mask misses them."""
 ROBOT_GROUP, ROBOT_MASK = 2, 1
-"""Robots collide with the world and are invisible to rays that ask for `WALL_GROUP`."""
+"""Robots collide with the world; rays with the mask `WALL_GROUP` ignore them."""
 
-_CLEARANCE = 0.2  # the smallest start margin: no robot may start inside a wall
+_CLEARANCE = 0.2  # smallest start margin, m: no robot may start inside a wall
 
 
 @dataclass(frozen=True)
 class Arena:
-    """Geometry and noise of one corral. Raises `ValueError` naming the field where the numbers cannot be built.
+    """Geometry and noise of one corral. Raises `ValueError` that names the field for impossible geometry.
 
     Attributes:
         side: inner edge length of the corral, m.
@@ -34,12 +34,12 @@ class Arena:
         lamp_beyond: distance from that wall's inner face to the lamp's axis, m.
         lamp_offset: y of the lamp's axis relative to the opening's middle, m.
         lamp_radius: m.
-        lamp_height: m; lower than the sensors, so that it stops the robot but is no obstacle to their beams.
-        wall_height: m; higher than the sensors.
+        lamp_height: m; below the sensors, so that the lamp stops the robot but not their beams.
+        wall_height: m; above the sensors.
         wall_thickness: m.
-        start_margin: smallest distance of a start position from an inner face, m.
-        wheel_noise: standard deviation of a wheel's speed as a fraction of the commanded speed. Without it the
-            bounces fall into limit cycles.
+        start_margin: smallest distance from a start position to an inner face, m.
+        wheel_noise: standard deviation of a wheel's speed, as a fraction of the commanded speed. Without noise robots
+            can bounce between walls in a cycle forever.
     """
 
     side: float = 3.0
@@ -65,17 +65,17 @@ class Arena:
         if abs(self.gap_offset) + self.gap / 2 >= self.side / 2:
             raise ValueError(
                 f"Arena.gap is {self.gap} m wide at offset {self.gap_offset} m; "
-                f"it must leave some wall on both sides of a {self.side} m side"
+                f"it must leave a piece of wall at both ends of the {self.side} m side"
             )
         if self.lamp_beyond < self.wall_thickness + self.lamp_radius:
             raise ValueError(
-                f"Arena.lamp_beyond is {self.lamp_beyond} m; a lamp of radius {self.lamp_radius} m stands clear of "
-                f"the wall from {self.wall_thickness + self.lamp_radius} m on"
+                f"Arena.lamp_beyond is {self.lamp_beyond} m; a lamp of radius {self.lamp_radius} m must be at least "
+                f"{self.wall_thickness + self.lamp_radius} m away to clear the wall"
             )
         if not _CLEARANCE <= self.start_margin < self.side / 2:
             raise ValueError(
                 f"Arena.start_margin is {self.start_margin} m; expected at least {_CLEARANCE} m (the robot's radius "
-                f"and some air) and less than half the side, {self.side / 2} m"
+                f"plus clearance) and less than half the side, {self.side / 2} m"
             )
         if self.wheel_noise < 0:
             raise ValueError(f"Arena.wheel_noise is {self.wheel_noise}; expected a fraction of the speed, 0 or more")
@@ -108,15 +108,15 @@ ARENAS: dict[str, Arena] = {
     "offset_lamp": Arena(lamp_offset=1.0),
     "large": Arena(side=4.8),
 }
-"""Arenas by name: the default is one that its teacher solves; the others are harder in one respect each.
+"""Arenas by name. The teacher solves the default; each of the others is harder in one respect.
 
-Measured over 200 starts, teacher's success, planar and wheeled: `narrow` 1.00 and .84 (wheels catch on the edge of the
-gap), `offset_lamp` .98 and .96 (some leave and miss the lamp), `large` .99 and .99, half as long again on the way.
+Success of the teacher over 200 starts, planar and wheeled: `narrow` 1.00 and .84 (wheels catch on the edge of the gap),
+`offset_lamp` .98 and .96 (some robots leave and miss the lamp), `large` .99 and .99 (takes 1.5 times as long).
 """
 
 
 def find_arena(arena: str | Arena) -> Arena:
-    """Look an arena up by name; an `Arena` is returned as it is. Raises `ValueError` listing the known names."""
+    """Find an arena by name; an `Arena` is returned as it is. Raises `ValueError` that lists the known names."""
     if isinstance(arena, Arena):
         return arena
     if not isinstance(arena, str) or arena not in ARENAS:
@@ -126,7 +126,7 @@ def find_arena(arena: str | Arena) -> Arena:
 
 @dataclass(frozen=True)
 class Start:
-    """Where an episode begins: x, y in m, heading in rad (0 faces the wall with the gap)."""
+    """The start pose of an episode: x, y in m, heading in rad (0 faces the wall with the gap)."""
 
     x: float
     y: float
@@ -134,11 +134,11 @@ class Start:
 
 
 def draw_episode(arena: Arena, seed: int, episode: int) -> tuple[Start, np.random.Generator]:
-    """Draw the start of an episode; the generator returned with it then gives the episode's wheel noise.
+    """Draw the start of an episode, and return it with the generator that draws the episode's wheel noise.
 
-    The generator is the episode's own, seeded with (seed, episode). So every controller meets the same start and the
-    same noise, at any batch size, worker count or order. Starts are uniform over the corral less its margin, headings
-    over the circle. Raises `ValueError` unless seed and episode are whole numbers, 0 or more.
+    The generator is seeded with (seed, episode), so every controller gets the same start and the same noise at any
+    batch size, worker count or order. Positions are uniform over the corral without its margin, headings over the
+    circle. Raises `ValueError` unless seed and episode are whole numbers, 0 or more.
     """
     seed, episode = whole_number("seed", seed), whole_number("episode", episode)
     generator = np.random.default_rng([seed, episode])
@@ -148,14 +148,14 @@ def draw_episode(arena: Arena, seed: int, episode: int) -> tuple[Start, np.rando
 
 
 def draw_start(arena: Arena, seed: int, episode: int) -> Start:
-    """The start of one episode (see `draw_episode`)."""
+    """The start of an episode, as `draw_episode` draws it."""
     return draw_episode(arena, seed, episode)[0]
 
 
 def build_corral(arena: Arena, client: int) -> None:
-    """Put the walls and the lamp of `arena` into the pybullet `client`, as immovable bodies without friction.
+    """Add the walls and the lamp of `arena` to the pybullet `client`, as fixed bodies without friction.
 
-    The floor is only seen: a body that stands on the ground brings its own.
+    The floor is only visual: a body that stands on the ground adds its own.
     """
     floor = pybullet.createVisualShape(
         pybullet.GEOM_BOX,

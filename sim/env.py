@@ -1,4 +1,4 @@
-"""Gymnasium's `CorralEscape-v0`: the corral as an environment, one robot or many. Registered by `import sim`."""
+"""The Gymnasium environment `CorralEscape-v0`, for one robot or many. `import sim` registers it."""
 
 from __future__ import annotations
 
@@ -11,23 +11,24 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.camera import photograph
+from sim.camera import render_rgb
+from sim.channel import Channel
 from sim.checks import whole_number
 from sim.corral import Arena
-from sim.fleet import Fleet, State, check_commands, control_steps
 from sim.robot import ACTUATORS, CONTROL_HZ
 from sim.sensors import SENSORS
 from sim.tracker import DWELL_SECONDS, Tracker
+from sim.vector_sim import State, VectorSim, check_commands, control_steps
 
 MAX_STEPS = 60 * CONTROL_HZ
-"""Control steps after which Gymnasium truncates an episode: 60 s."""
+"""Gymnasium truncates an episode after this many control steps (60 s)."""
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 
-def _box(table: tuple[tuple[str, float, float, str], ...]) -> spaces.Box:
-    low, high = np.array([[row[1], row[2]] for row in table]).T
+def _box(channels: tuple[Channel, ...]) -> spaces.Box:
+    low, high = np.array([(channel.low, channel.high) for channel in channels]).T
     return spaces.Box(low, high, dtype=np.float64)
 
 
@@ -36,27 +37,27 @@ def _check_render_mode(render_mode: str | None) -> None:
         raise ValueError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
 
 
-class _Cells:
-    """What both environments share: robots, their episodes, and what counts in them."""
+class _EnvState:
+    """The state that both environments share: the robots, their episodes, and the progress of each."""
 
     def __init__(self, size: int, arena: str | Arena, body: str, dwell: float) -> None:
         self.tracker = Tracker(size, control_steps(dwell))
-        self.fleet = Fleet(size, arena, body)
+        self.simulator = VectorSim(size, arena, body)
         self.episodes = np.zeros(size, dtype=np.int64)
 
     def reset(self, slot: int, episode: int) -> None:
-        self.fleet.reset(slot, episode)
+        self.simulator.reset(slot, episode)
         self.tracker.reset(slot)
         self.episodes[slot] = episode
 
     def check_open(self) -> None:
         """Raise if the physics clients are disconnected."""
-        if self.fleet.closed:
-            raise gymnasium.error.ClosedEnvironmentError("the environment is closed; make another one")
+        if self.simulator.closed:
+            raise gymnasium.error.ClosedEnvironmentError("the environment is closed; make a new one")
 
     def observe(self) -> State:
         slots = range(len(self.episodes))
-        state = self.fleet.observe(slots)
+        state = self.simulator.observe(slots)
         self.tracker.observe(np.arange(len(self.episodes)), state)
         return state
 
@@ -64,7 +65,7 @@ class _Cells:
         commands = check_commands(action, len(slots))
         if not np.isfinite(commands).all():
             raise ValueError(f"action {commands.tolist()}; expected finite commands in [-1, 1]")
-        self.fleet.drive(slots, commands)
+        self.simulator.drive(slots, commands)
 
     def info(self, state: State) -> dict[str, NDArray[Any]]:
         return {
@@ -81,8 +82,8 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     """
     ## Description
 
-    A round robot with a differential drive stands in a square corral with one gap. Outside, beyond the gap, stands a
-    lamp. The robot is to find the lamp and to stay there. This is the corral-escape task of Neubert et al. 2016,
+    A round robot with a differential drive starts in a square corral with one gap. A lamp is outside, beyond the gap.
+    The robot has to find the lamp and to stay there. This is the corral-escape task of Neubert et al. 2016,
     section IV; `sim.Teacher` solves it with five if-else rules.
 
     ## Action space
@@ -94,7 +95,7 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     | 0     | left wheel  | -1  | 1   | fraction of full speed (0.4 m/s) |
     | 1     | right wheel | -1  | 1   | fraction of full speed (0.4 m/s) |
 
-    Each wheel turns with its commanded speed times `1 + wheel_noise * N(0, 1)`, drawn anew for each control step.
+    Each wheel turns with its commanded speed times `1 + wheel_noise * N(0, 1)`, drawn for each control step.
 
     ## Observation space
 
@@ -112,9 +113,9 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
 
     ## Start
 
-    Uniform over the corral less a margin, any heading. `reset(seed=s)` begins episode 0 of seed `s`, each further
-    `reset()` the next one; `reset(options={"episode": k})` begins episode `k`. The start and the wheel noise depend on
-    (seed, episode) alone: they are those of `sim.rollout(..., seed=s, episodes=[k])`.
+    Uniform over the corral without a margin, any heading. `reset(seed=s)` begins episode 0 of seed `s`, and each
+    further `reset()` the next one. `reset(options={"episode": k})` begins episode `k`. The start and the wheel noise
+    depend only on (seed, episode): they equal those of `sim.rollout(..., seed=s, episodes=[k])`.
 
     ## End
 
@@ -151,64 +152,64 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self.render_mode = render_mode
         self.observation_space = _box(SENSORS)
         self.action_space = _box(ACTUATORS)
-        self._cells = _Cells(1, arena, body, dwell)
+        self._state = _EnvState(1, arena, body, dwell)
         self._episode: int | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin an episode (see "Start").
+        """Begin an episode as described under "Start".
 
-        Raises `ValueError` for an option other than `episode`, and unless seed and episode are whole numbers from 0 on.
+        Raises `ValueError` for options other than `episode`, and unless seed and episode are whole numbers, 0 or more.
         """
-        self._cells.check_open()
+        self._state.check_open()
         unknown = set(options or {}) - {"episode"}
         if unknown:
-            raise ValueError(f"unknown reset options {sorted(map(str, unknown))}; expected 'episode' alone")
-        asked = whole_number("episode", options["episode"]) if options else None
+            raise ValueError(f"unknown reset options {sorted(map(str, unknown))}; expected only 'episode'")
+        requested = whole_number("episode", options["episode"]) if options else None
         seed = None if seed is None else whole_number("seed", seed)
         super().reset(seed=seed)
         before = self._episode
         if seed is not None or before is None:
-            self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+            self._state.simulator.seed = int(self.np_random.integers(2**31)) if seed is None else seed
             before = -1
-        self._episode = before + 1 if asked is None else asked
-        self._cells.reset(0, self._episode)
-        state = self._cells.observe()
+        self._episode = before + 1 if requested is None else requested
+        self._state.reset(0, self._episode)
+        state = self._state.observe()
         return state.sensors[0], self._info(state)
 
     def step(self, action: Floats) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Drive for one control step. Raises `ValueError` for an action that is not two finite numbers."""
-        self._cells.check_open()
+        self._state.check_open()
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        self._cells.drive([0], [action])
-        state = self._cells.observe()
-        success = bool(self._cells.tracker.success[0])
+        self._state.drive([0], [action])
+        state = self._state.observe()
+        success = bool(self._state.tracker.success[0])
         return state.sensors[0], float(success), success, False, self._info(state)
 
     def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """A picture `[H, W, 3]`, or None without a render mode."""
+        """A picture `[H, W, 3]` uint8, or None without a render mode."""
         if self.render_mode is None:
             return None
-        self._cells.check_open()
-        return photograph(self._cells.fleet.worlds[0].client, self._cells.fleet.arena)
+        self._state.check_open()
+        return render_rgb(self._state.simulator.worlds[0].client, self._state.simulator.arena)
 
     def close(self) -> None:
-        """Disconnect the physics client; closing twice is fine."""
-        self._cells.fleet.close()
+        """Disconnect the physics client. A second call does nothing."""
+        self._state.simulator.close()
 
     def _info(self, state: State) -> dict[str, Any]:
         return {
-            name: column[0] if column.ndim > 1 else column[0].item() for name, column in self._cells.info(state).items()
+            name: column[0] if column.ndim > 1 else column[0].item() for name, column in self._state.info(state).items()
         }
 
 
 class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
-    """`num_envs` corrals side by side: `CorralEscapeEnv` row by row, bit for bit.
+    """`num_envs` independent copies of `CorralEscapeEnv`, each with the same bits as a single one.
 
-    Autoreset mode `NEXT_STEP`: the step after an episode's last one ignores that row's action and returns the first
-    observation of its next episode, with reward 0. With `reset(seed=s)`, environment `i` plays the episodes
-    `i`, `i + num_envs`, `i + 2 * num_envs`, ... of seed `s`. `info` holds the scalar's entries as arrays. Arguments as
-    there; `max_episode_steps` truncates.
+    Autoreset mode `NEXT_STEP`: the step after the last one of an episode ignores that row's action and returns the
+    first observation of its next episode, with reward 0. With `reset(seed=s)`, environment `i` plays the episodes
+    `i`, `i + num_envs`, `i + 2 * num_envs`, ... of seed `s`. `info` holds the same entries as arrays. The other
+    arguments are the same; `max_episode_steps` truncates episodes.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012
@@ -236,57 +237,56 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._max_episode_steps = max_episode_steps
-        self._cells = _Cells(num_envs, arena, body, dwell)
+        self._state = _EnvState(num_envs, arena, body, dwell)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._ready = False
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin the first episode of every environment. Raises `ValueError` for any option, and as the scalar does."""
-        self._cells.check_open()
+        """Begin the first episode of every environment. Raises `ValueError` for any option or a bad seed."""
+        self._state.check_open()
         if options:
             raise ValueError(f"unknown reset options {sorted(map(str, options))}; the vector environment takes none")
         seed = None if seed is None else whole_number("seed", seed)
         super().reset(seed=seed)
-        self._cells.fleet.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+        self._state.simulator.seed = int(self.np_random.integers(2**31)) if seed is None else seed
         for slot in range(self.num_envs):
-            self._cells.reset(slot, slot)
+            self._state.reset(slot, slot)
         self._over[:] = False
         self._ready = True
-        state = self._cells.observe()
-        return state.sensors, self._cells.info(state)
+        state = self._state.observe()
+        return state.sensors, self._state.info(state)
 
     def step(self, actions: Floats) -> tuple[Floats, Floats, Flags, Flags, dict[str, Any]]:
-        """Drive each robot for one control step, or begin its next episode if the last one is over."""
-        self._cells.check_open()
+        """Drive each robot for one control step; a robot whose episode is over begins its next one."""
+        self._state.check_open()
         if not self._ready:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         commands = check_commands(actions, self.num_envs)
-        again = self._over
-        going = np.flatnonzero(~again).tolist()
-        if going:
-            self._cells.drive(going, commands[going])
-        for slot in np.flatnonzero(again).tolist():
-            self._cells.reset(slot, int(self._cells.episodes[slot]) + self.num_envs)
-        state = self._cells.observe()
-        terminated = self._cells.tracker.success.copy()
-        truncated = ~terminated & (self._cells.tracker.clock >= self._max_episode_steps)
+        driven = np.flatnonzero(~self._over).tolist()
+        if driven:
+            self._state.drive(driven, commands[driven])
+        for slot in np.flatnonzero(self._over).tolist():
+            self._state.reset(slot, int(self._state.episodes[slot]) + self.num_envs)
+        state = self._state.observe()
+        terminated = self._state.tracker.success.copy()
+        truncated = ~terminated & (self._state.tracker.clock >= self._max_episode_steps)
         self._over = terminated | truncated
-        return state.sensors, terminated.astype(np.float64), terminated, truncated, self._cells.info(state)
+        return state.sensors, terminated.astype(np.float64), terminated, truncated, self._state.info(state)
 
     def render(self) -> tuple[NDArray[np.uint8], ...] | None:
         """One picture `[H, W, 3]` per environment, or None without a render mode."""
         if self.render_mode is None:
             return None
-        self._cells.check_open()
-        return tuple(photograph(world.client, self._cells.fleet.arena) for world in self._cells.fleet.worlds)
+        self._state.check_open()
+        return tuple(render_rgb(world.client, self._state.simulator.arena) for world in self._state.simulator.worlds)
 
     def close_extras(self, **_: Any) -> None:
         """Disconnect the physics clients."""
-        self._cells.fleet.close()
+        self._state.simulator.close()
 
 
 def register() -> None:
-    """Register `CorralEscape-v0`, once."""
+    """Register `CorralEscape-v0` unless it is registered already."""
     if "CorralEscape-v0" not in gymnasium.registry:
         gymnasium.register(
             id="CorralEscape-v0",

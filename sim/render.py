@@ -1,6 +1,6 @@
-"""Pictures of rollouts: the corral from above, trajectories, and two robots side by side as an animation.
+"""Pictures of rollouts: the corral from above, trajectories, and animations of several robots side by side.
 
-Not imported by `sim` itself, which needs no matplotlib: `from sim import render`.
+`import sim` does not import this module, which needs matplotlib: write `from sim import render`.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from sim.teacher import BEHAVIOURS, Teacher
 
 WALL, LAMP, INK, PAPER = "#3d4654", "#f5b400", "#22272f", "#ffffff"
 COLOURS = {"seek_light": "#e07b00", "avoid": "#c8324b", "cruise": "#3f74b5"}
-"""One colour for each behaviour that the readings call for."""
+"""The colour of each of the teacher's behaviours."""
 
 
 def draw_corral(ax: Axes, arena: Arena) -> None:
-    """Draw walls, gap and lamp from above into `ax`, in m, with equal scales and without frame."""
+    """Draw walls and lamp from above into `ax`, in m, with equal scales and without a frame."""
     for x, y, half_x, half_y in arena.walls.tolist():
         ax.add_patch(Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, color=WALL, lw=0, zorder=2))
     for scale, alpha in ((3.2, 0.10), (2.2, 0.16), (1.5, 0.25), (1.0, 1.0)):
@@ -43,18 +43,18 @@ def draw_corral(ax: Axes, arena: Arena) -> None:
 
 
 def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = None, legend: bool = True) -> None:
-    """Draw a corral and trajectories in it, coloured by the behaviour that the readings call for.
+    """Draw a corral and trajectories, coloured by the behaviour that the teacher would choose.
 
-    Starts are hollow dots; a cross marks where a robot ended that did not succeed.
+    A hollow dot marks each start; a cross marks the end of an episode without success.
 
     Args:
         ax: where to draw.
-        rollout: a recorded one.
-        episodes: which; the first 12 unless told.
-        legend: explain colours and marks under the picture.
+        rollout: a recorded rollout.
+        episodes: the episodes to draw; by default the first 12.
+        legend: whether to explain colours and marks under the picture.
 
     Raises:
-        KeyError: an episode that is not there, or a rollout without trajectories.
+        KeyError: an episode is missing, or the rollout has no trajectories.
     """
     draw_corral(ax, rollout.arena)
     for episode in rollout.episode[:12].tolist() if episodes is None else episodes:
@@ -63,7 +63,7 @@ def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = No
         pieces = np.stack([points[:-1], points[1:]], axis=1)
         colours = [_COLOUR_OF_RULE[rule] for rule in Teacher().rule(path.sensors[:-1]).tolist()]
         ax.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.1, alpha=0.75, zorder=3))
-        # Avoiding turns on the spot: a line alone would hide it.
+        # A robot that avoids an obstacle turns on the spot, which a line does not show.
         turns = points[Teacher().rule(path.sensors) == _AVOID]
         ax.scatter(turns[:, 0], turns[:, 1], s=9, color=COLOURS["avoid"], lw=0, zorder=4)
         ax.plot(*points[0], "o", ms=5, mfc=PAPER, mec=INK, mew=1.2, zorder=5)
@@ -91,25 +91,25 @@ def animate(
 ) -> Path:
     """Write a GIF of one episode of several rollouts side by side, with trails and the time.
 
-    The robot's outline, its lit light sensors and its distance beam are drawn from the recorded readings. The file
-    appears whole or not at all.
+    Shows the robot's outline, its lit light sensors and its distance beam, from the recorded readings. The file is
+    written atomically.
 
     Args:
-        rollouts: recorded, in the same arena.
-        titles: one a rollout.
+        rollouts: recorded rollouts in the same arena.
+        titles: one per rollout.
         path: the file to write; its folder must exist.
-        episode: which; the most typical one that succeeds in all unless told (of median length).
-        speed: how many times faster than real.
-        frames: at most this many; a longer episode is drawn in larger steps.
+        episode: its number; by default the one of median length among those that succeed in the most rollouts.
+        speed: playback speed relative to real time.
+        frames: maximum number of frames; a longer episode is drawn in larger steps.
 
     Raises:
-        ValueError: not one title a rollout, different arenas, no common episode, or numbers out of range.
+        ValueError: not one title per rollout, different arenas, no common episode, or numbers out of range.
         KeyError: the episode is missing in a rollout, or was not recorded.
     """
     if not rollouts or len(rollouts) != len(titles):
-        raise ValueError(f"{len(rollouts)} rollouts and {len(titles)} titles; expected one title a rollout")
+        raise ValueError(f"{len(rollouts)} rollouts and {len(titles)} titles; expected one title per rollout")
     if len({rollout.arena for rollout in rollouts}) > 1:
-        raise ValueError("the rollouts are from different arenas; expected the same one")
+        raise ValueError("the rollouts are from different arenas; expected one arena")
     if speed <= 0 or frames < 1:
         raise ValueError(f"speed={speed}, frames={frames}; expected a speed above 0 and at least 1 frame")
     chosen = _typical(rollouts) if episode is None else episode
@@ -117,7 +117,7 @@ def animate(
         _Panel(rollout.slice(chosen), title, rollout.arena) for rollout, title in zip(rollouts, titles, strict=True)
     ]
     length = max(len(panel) for panel in panels)
-    # Two control steps a frame are smooth; at least 20 ms a frame, below which viewers slow a GIF down.
+    # Two control steps per frame look smooth. Viewers slow down a GIF with less than 20 ms per frame.
     stride = max(2, -(-length // frames), math.ceil(speed * 0.02 * CONTROL_HZ))
     ticks = [*range(0, length - 1, stride), length - 1]
     images = [_join([panel.frame(tick) for panel in panels], speed) for tick in ticks]
@@ -133,10 +133,10 @@ def animate(
 
 
 def _typical(rollouts: Sequence[Rollout]) -> int:
-    """The common episode whose length is the median, among those that succeed in as many rollouts as possible."""
+    """The episode of median length among the common ones that succeed in the most rollouts."""
     common = sorted(set.intersection(*(set(rollout.episode.tolist()) for rollout in rollouts)))
     if not common:
-        raise ValueError("the rollouts have no episode in common to show side by side")
+        raise ValueError("the rollouts have no episode in common")
     scored = []
     for episode in common:
         rows = [int(np.flatnonzero(rollout.episode == episode)[0]) for rollout in rollouts]
@@ -160,7 +160,7 @@ _BEHAVIOUR_OF_RULE = {rule: name.replace("_", " ") for name, rules in BEHAVIOURS
 
 
 class _Panel:
-    """One robot's picture, drawn `_FINE` times too large and scaled down, which smooths every edge."""
+    """The picture of one robot, drawn `_FINE` times larger and scaled down to smooth all edges."""
 
     _WIDTH, _FINE, _HEAD, _FOOT = 400, 2, 34, 24
 
@@ -185,7 +185,7 @@ class _Panel:
         return len(self._path)
 
     def frame(self, tick: int) -> Image.Image:
-        """The picture at control step `tick`; a robot that is done stays where it ended."""
+        """The picture at control step `tick`; after its last step a robot stays where it ended."""
         tick = min(tick, len(self) - 1)
         path = self._path
         pen = ImageDraw.Draw(self._trail)

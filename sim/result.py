@@ -1,4 +1,4 @@
-"""What a rollout leaves behind: one row an episode, one row a control step, and their summary."""
+"""The result of a rollout: one row per episode, one row per control step, and a summary."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True)
 class Steps:
-    """Control steps, one row each: the state in which a command was given, and the command.
+    """Control steps, one row each: the state before the command, and the command.
 
     Attributes:
         step: `[N]`, index within the episode, from 0.
         x, y: `[N]`, m; heading: `[N]`, rad.
         sensors: `[N, 3]`, see `sim.sensors.SENSORS`.
-        commands: `[N, 2]`, as the policy gave them, before clipping and wheel noise.
-        contact: `[N]`, touching a wall.
-        at_lamp: `[N]`, touching the lamp.
-        reached: `[N]`, has touched the lamp, now or earlier in the episode.
+        commands: `[N, 2]`, before clipping and wheel noise.
+        contact: `[N]`, whether the robot touches a wall.
+        at_lamp: `[N]`, whether it touches the lamp.
+        reached: `[N]`, whether it touches the lamp or did earlier in the episode.
     """
 
     step: Integers
@@ -43,22 +43,22 @@ class Steps:
     def __len__(self) -> int:
         return len(self.step)
 
-    def rows(self, which: slice | Integers | Flags) -> Steps:
-        """The chosen rows: a slice, indices or a mask."""
-        return Steps(**{field.name: getattr(self, field.name)[which] for field in fields(self)})
+    def rows(self, selection: slice | Integers | Flags) -> Steps:
+        """The rows that a slice, indices or a mask select."""
+        return Steps(**{field.name: getattr(self, field.name)[selection] for field in fields(self)})
 
 
 @dataclass(frozen=True)
 class Summary:
-    """The figures of a rollout; rates are fractions.
+    """Summary statistics of a rollout; rates are fractions.
 
     Attributes:
         episodes: number of episodes.
         success_rate: with its Wilson 95 % interval `success_low`, `success_high`.
-        escape_rate: episodes in which the robot left the corral.
-        time_to_light_s: median time to the first touch of the lamp, failures censored; None where the median is.
-        dwell_fraction: control steps at the lamp of all after first reaching it; None if no robot reached it.
-        collision_fraction: control steps in contact with a wall, of all.
+        escape_rate: fraction of the episodes in which the robot left the corral.
+        time_to_light_s: median time to the first touch of the lamp, failures censored; None if the median is censored.
+        dwell_fraction: fraction of the control steps at the lamp since first reaching it; None if no robot did.
+        collision_fraction: fraction of all control steps in contact with a wall.
     """
 
     episodes: int
@@ -73,20 +73,20 @@ class Summary:
 
 @dataclass(frozen=True)
 class Rollout:
-    """Episodes of one policy in one arena.
+    """Episodes of one controller in one arena.
 
     Attributes:
-        arena, body, seed, seconds, dwell_seconds: the conditions.
-        episode: `[E]`, as asked for.
-        success: `[E]`, at the lamp throughout the dwell time; the episode ended then, else at `seconds`.
-        escaped: `[E]`, left the corral at any time.
-        time_to_light: `[E]`, s to the first touch of the lamp, NaN if there was none.
-        steps: `[E]`, control steps driven.
-        dwell: `[E]`, fraction of the control steps since first reaching the lamp that were at it, NaN if none.
+        arena, body, seed, seconds, dwell_seconds: the arguments of `rollout`.
+        episode: `[E]`, the numbers of the episodes.
+        success: `[E]`, whether the robot stayed at the lamp for the dwell time, which ends the episode early.
+        escaped: `[E]`, whether it left the corral at any time.
+        time_to_light: `[E]`, time to the first touch of the lamp in s, NaN if there was none.
+        steps: `[E]`, number of control steps.
+        dwell: `[E]`, fraction of the control steps at the lamp since first reaching it, NaN if it never did.
         collisions: `[E]`, fraction of the control steps in contact with a wall.
         start: `[E, 3]`, x, y, heading.
-        trajectory: the control steps of all episodes, one after the other; empty if not recorded.
-        offsets: `[E + 1]`; episode e owns rows `offsets[e]:offsets[e + 1]` of `trajectory`.
+        trajectory: the control steps of all episodes, concatenated; empty if not recorded.
+        offsets: `[E + 1]`; rows `offsets[e]:offsets[e + 1]` of `trajectory` belong to episode e.
     """
 
     arena: Arena
@@ -110,7 +110,7 @@ class Rollout:
 
     @property
     def recorded(self) -> bool:
-        """Whether the control steps were kept."""
+        """Whether the control steps were recorded."""
         return len(self.trajectory) > 0
 
     @property
@@ -119,7 +119,7 @@ class Rollout:
         return np.repeat(self.episode, np.diff(self.offsets))
 
     def slice(self, episode: int) -> Steps:
-        """The trajectory of one episode, by its number. Raises `KeyError` if it is not there or was not recorded."""
+        """The trajectory of one episode, by its number. Raises `KeyError` if it is missing or was not recorded."""
         (rows,) = np.nonzero(self.episode == episode)
         if not rows.size:
             raise KeyError(
@@ -132,10 +132,10 @@ class Rollout:
         return self.trajectory.rows(slice(int(self.offsets[row]), int(self.offsets[row + 1])))
 
     def summary(self) -> Summary:
-        """The figures of this rollout."""
+        """Summary statistics of this rollout."""
         low, high = wilson(int(self.success.sum()), len(self))
         reached = ~np.isnan(self.dwell)
-        # Steps since first reaching the lamp, so that episodes are pooled step by step.
+        # Weights: the control steps since first reaching the lamp, so that every step counts the same.
         since = self.steps[reached] - np.rint(self.time_to_light[reached] * CONTROL_HZ).astype(np.int64)
         return Summary(
             episodes=len(self),

@@ -1,7 +1,7 @@
 """The robot: a round differential drive, as an ideal planar body or as wheels on a floor.
 
-Both bodies have the same outline, track and speeds, take the same wheel speeds and report the same pose, so that
-what is measured with the fast one can be checked with the true one.
+Both bodies have the same outline, track and speeds, and the same interface: results of the fast planar body can be
+checked with the realistic wheeled one.
 """
 
 from __future__ import annotations
@@ -10,8 +10,8 @@ import math
 from pathlib import Path
 from typing import Protocol
 
-import pybullet
-
+from sim._pybullet import pybullet
+from sim.channel import Channel
 from sim.corral import ROBOT_GROUP, ROBOT_MASK, WALL_GROUP, WALL_MASK, Start
 
 RADIUS = 0.15
@@ -23,44 +23,44 @@ MAX_SPEED = 0.4
 CONTROL_HZ = 20
 """Control steps per second."""
 WHEEL_RADIUS = 0.04
-"""Of the wheeled body, m."""
+"""Radius of the wheels of the wheeled body, m."""
 HEIGHT = 0.06
 """Height of the body's centre above the floor, m."""
 
-ACTUATORS: tuple[tuple[str, float, float, str], ...] = (
-    ("left_motor", -1.0, 1.0, "fraction of full speed"),
-    ("right_motor", -1.0, 1.0, "fraction of full speed"),
+ACTUATORS = (
+    Channel("left_motor", -1.0, 1.0, "fraction of full speed"),
+    Channel("right_motor", -1.0, 1.0, "fraction of full speed"),
 )
-"""The commands in order: (name, low, high, unit)."""
+"""The commands, in order."""
 
 Pose = tuple[float, float, float, float]
 """x, y in m, cosine and sine of the heading."""
 
 
 class Body(Protocol):
-    """A robot in a pybullet client of its own."""
+    """A robot in its own pybullet client."""
 
     id: int
     """The body's id in its client, for cameras."""
 
     def __init__(self, client: int) -> None:
-        """Build the robot in `client`, and set the engine's parameters for it."""
+        """Build the robot in `client` and set the engine's parameters."""
         ...
 
     def place(self, start: Start) -> Pose:
-        """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
+        """Put the robot at `start`, at rest, as if it had just been built. Returns its pose."""
         ...
 
     def drive(self, left: float, right: float) -> Pose:
-        """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
+        """Turn the wheels at these speeds (m/s) for one control step. Returns the pose after it."""
         ...
 
 
 class PlanarBody:
-    """A body without ground contact: its velocity follows from the wheel speeds, pybullet resolves the contacts.
+    """A body without ground contact: the wheel speeds set its velocity, and pybullet resolves its contacts.
 
-    Collides as a sphere whose equator lies below the lamp's top, so that contact normals are horizontal and the
-    body neither tilts, rises nor sinks. It is frictionless: contacts stop and deflect it, but never turn it.
+    It collides as a sphere whose equator is below the lamp's top, so that contact normals are horizontal and the body
+    neither tilts, rises nor sinks. It has no friction: contacts stop and deflect it, but never turn it.
     """
 
     _SUBSTEPS = 2
@@ -107,18 +107,18 @@ class PlanarBody:
         self._pose, self._sunk = _pose(self.id, client)
 
     def place(self, start: Start) -> Pose:
-        """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
+        """Put the robot at `start`, at rest, as if it had just been built. Returns its pose."""
         self._pose, self._sunk = _place(self.id, start, self._client)
         return self._pose
 
     def drive(self, left: float, right: float) -> Pose:
-        """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
+        """Turn the wheels at these speeds (m/s) for one control step. Returns the pose after it."""
         client, body = self._client, self.id
         speed, turn = (left + right) / 2, (right - left) / TRACK
         step = turn / (CONTROL_HZ * self._SUBSTEPS)
         # Each physics step goes straight along the middle heading of its arc.
         heading = math.atan2(self._pose[3], self._pose[2]) + step / 2
-        # Contact normals are horizontal up to rounding: unless undone, minutes against the lamp add up to millimetres.
+        # Contact normals are horizontal only up to rounding, which would sink the body by millimetres in minutes.
         rise = self._sunk * CONTROL_HZ
         for _ in range(self._SUBSTEPS):
             velocity = (speed * math.cos(heading), speed * math.sin(heading), rise)
@@ -130,10 +130,10 @@ class PlanarBody:
 
 
 class WheeledBody:
-    """Two driven wheels and two casters on a floor, from `robot.urdf`; wheel motors hold the commanded speeds."""
+    """Two driven wheels and two casters on a floor, from `robot.urdf`; motors hold the commanded wheel speeds."""
 
     _SUBSTEPS = 6
-    _TORQUE = 0.3  # N m a wheel: reaches full speed within one control step, stalls against a wall
+    _TORQUE = 0.3  # N m per wheel: full speed within one control step, but stalls at a wall
     _GRIP = 1.0
 
     def __init__(self, client: int) -> None:
@@ -147,7 +147,7 @@ class WheeledBody:
         )
         pybullet.setGravity(0, 0, -9.81, physicsClientId=client)
         plane = pybullet.createCollisionShape(pybullet.GEOM_PLANE, physicsClientId=client)
-        # A plane without a picture of its own is drawn as a checkerboard; a speck under the floor prevents it.
+        # A plane without a visual shape is drawn as a checkerboard; a tiny sphere under the floor prevents that.
         speck = pybullet.createVisualShape(
             pybullet.GEOM_SPHERE, radius=0.001, visualFramePosition=[0, 0, -0.5], physicsClientId=client
         )
@@ -181,13 +181,13 @@ class WheeledBody:
             )
 
     def place(self, start: Start) -> Pose:
-        """Put the robot at `start`, at rest, as if it had just been built; returns its pose."""
+        """Put the robot at `start`, at rest, as if it had just been built. Returns its pose."""
         for wheel in self._wheels:
             pybullet.resetJointState(self.id, wheel, 0.0, 0.0, physicsClientId=self._client)
         return _place(self.id, start, self._client)[0]
 
     def drive(self, left: float, right: float) -> Pose:
-        """Turn the wheels with these speeds (m/s) for one control step; returns the pose after it."""
+        """Turn the wheels at these speeds (m/s) for one control step. Returns the pose after it."""
         pybullet.setJointMotorControlArray(
             self.id,
             self._wheels,
@@ -205,7 +205,7 @@ BODIES: dict[str, type[PlanarBody] | type[WheeledBody]] = {"planar": PlanarBody,
 
 
 def find_body(body: str) -> type[PlanarBody] | type[WheeledBody]:
-    """Look a body up by name. Raises `ValueError` listing the known names."""
+    """Find a body by name. Raises `ValueError` that lists the known names."""
     if not isinstance(body, str) or body not in BODIES:
         raise ValueError(f"unknown body {body!r}; expected one of {sorted(BODIES)}")
     return BODIES[body]
@@ -219,9 +219,9 @@ def _place(body: int, start: Start, client: int) -> tuple[Pose, float]:
 
 
 def _pose(body: int, client: int) -> tuple[Pose, float]:
-    """The pose, and how far the body's centre is below its height."""
+    """The pose, and how far the body's centre is below `HEIGHT`."""
     (x, y, z), (qx, qy, qz, qw) = pybullet.getBasePositionAndOrientation(body, client)
-    # The direction of the body's x axis seen from above; a tilting body shortens it.
+    # The body's x axis seen from above; tilting shortens it.
     cos, sin = 1 - 2 * (qy * qy + qz * qz), 2 * (qx * qy + qw * qz)
     length = math.sqrt(cos * cos + sin * sin)
     return (x, y, cos / length, sin / length), HEIGHT - z

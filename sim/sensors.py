@@ -1,7 +1,7 @@
-"""What the robot senses: two lights and one distance.
+"""The robot's sensors: two for light, one for distance.
 
-Both light sensors sit on the rim at ±`LIGHT_MOUNT` from the heading and look into overlapping cones, so that a
-robot that faces the lamp has both lit. They see the lamp's axis, not its rim; a wall between hides it.
+The light sensors are on the robot's rim at ±`LIGHT_MOUNT` from the heading. Their cones overlap, so that both are lit
+when the robot faces the lamp. They see the lamp's axis, not its rim; a wall in between hides it.
 """
 
 from __future__ import annotations
@@ -10,42 +10,43 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
+from sim.channel import Channel
 from sim.corral import WALL_GROUP, Arena
 from sim.robot import RADIUS
 
 LIGHT_MAX = 5.0
-"""What a light sensor reads where it senses no lamp, m."""
+"""The reading of a light sensor that senses no lamp, m."""
 LIGHT_REACH = 4.5
-"""Light is sensed up to this distance, m: every lit reading stays 1/10 of the range below `LIGHT_MAX`."""
+"""Light is sensed up to this distance, m. Every lit reading is at least 1/10 of the range below `LIGHT_MAX`."""
 LIGHT_MOUNT = math.radians(60)
-"""Bearing of the sensors' mounts on the rim, left positive."""
+"""Bearing of the light sensors on the rim; left is positive."""
 LIGHT_INWARD, LIGHT_OUTWARD = math.radians(40), math.radians(60)
-"""Each cone reaches this far across the heading, and this far to its own side."""
+"""Each cone extends this far across the heading, and this far to its own side."""
 
 DISTANCE_MAX = 0.6
-"""Range of the distance sensor and its reading where nothing is hit, m."""
+"""Range of the distance sensor, and its reading if nothing is hit, m."""
 BEAMS = (0.0, 0.4, -0.4)
-"""Bearings of the distance sensor's beams; the nearest hit counts. One beam alone misses walls at a grazing angle."""
+"""Bearings of the distance sensor's beams; the nearest hit counts. A single beam misses walls at a grazing angle."""
 SENSOR_HEIGHT = 0.16
 """Height of all beams, m: above the lamp, below the top of the walls."""
 
-SENSORS: tuple[tuple[str, float, float, str], ...] = (
-    ("light_left", 0.0, LIGHT_MAX, "m"),
-    ("light_right", 0.0, LIGHT_MAX, "m"),
-    ("distance", 0.0, DISTANCE_MAX, "m"),
+SENSORS = (
+    Channel("light_left", 0.0, LIGHT_MAX, "m"),
+    Channel("light_right", 0.0, LIGHT_MAX, "m"),
+    Channel("distance", 0.0, DISTANCE_MAX, "m"),
 )
-"""The readings in order: (name, low, high, unit)."""
+"""The readings, in order."""
 
 
 class SensorArray:
     """Reads the sensors of a batch of robots in one arena, each in its own pybullet client.
 
-    `light_left`, `light_right`: distance from the sensor to the lamp's surface (never below 0) if the lamp's axis is
+    `light_left`, `light_right`: distance from the sensor to the lamp's surface (at least 0) if the lamp's axis is
     inside the cone, nearer than `LIGHT_REACH` and not behind a wall, else `LIGHT_MAX`. `distance`: length of the
-    beam from the rim to the nearest wall ahead, `DISTANCE_MAX` where nothing is hit. Readings carry no noise.
+    beam from the rim to the nearest wall ahead, `DISTANCE_MAX` if nothing is hit. Readings are without noise.
     """
 
     def __init__(self, arena: Arena) -> None:
@@ -68,7 +69,7 @@ class SensorArray:
     ) -> NDArray[np.float64]:
         """Readings `[B, 3]` (see `SENSORS`) of robots at `x`, `y` `[B]` with heading (`cos`, `sin`).
 
-        Only sums, products and square roots touch the batch, so a row's bits do not depend on its neighbours.
+        The batch is computed with sums, products and square roots only, so no row's bits depend on other rows.
         """
         readings = np.empty((len(clients), 3))
         candidates: list[list[bool]] = []

@@ -1,6 +1,6 @@
 """States of controllers: nested tuples, lists and dictionaries of arrays or tensors, one row per robot.
 
-Tensors are handled by their own methods, so that nothing here imports PyTorch.
+Only methods of tensors are used, so that this module does not import PyTorch.
 """
 
 from __future__ import annotations
@@ -14,19 +14,21 @@ from numpy.typing import NDArray
 
 
 def check_rows(state: Any, batch: int) -> None:
-    """Raise `ValueError` unless all that `state` holds are arrays and tensors of `batch` rows."""
+    """Raise `ValueError` unless `state` holds only arrays and tensors with `batch` rows."""
     _map(lambda leaf: _check_leaf(leaf, batch), state)
 
 
 def check_alike(state: Any, earlier: Any) -> None:
-    """Raise `ValueError` unless two states have the same structure, types of numbers and shapes of rows."""
-    ours, theirs = (_map(lambda leaf: (leaf.dtype, tuple(leaf.shape[1:])), one) for one in (state, earlier))
-    if ours != theirs:
-        raise ValueError(f"the state holds {ours}, earlier it held {theirs}; its structure, types and shapes must stay")
+    """Raise `ValueError` unless two states have the same structure, dtypes and shapes of rows."""
+    now, before = (_map(lambda leaf: (leaf.dtype, tuple(leaf.shape[1:])), tree) for tree in (state, earlier))
+    if now != before:
+        raise ValueError(
+            f"the state holds {now}, earlier it held {before}; its structure, types and shapes must not change"
+        )
 
 
 def is_empty(state: Any) -> bool:
-    """Whether the state holds no number: the robots remember nothing."""
+    """Whether the state holds no number, so that the robots have no memory."""
     sizes: list[int] = []
     _map(lambda leaf: sizes.append(math.prod(leaf.shape)), state)
     return not any(sizes)
@@ -38,12 +40,12 @@ def rows_of(state: Any, index: slice | NDArray[np.int64]) -> Any:
 
 
 def join(state: Any, more: Any) -> Any:
-    """The rows of `state` followed by those of `more`, which must be alike (see `check_alike`)."""
+    """Append the rows of `more` to those of `state`; both must pass `check_alike`."""
     return _map(_concatenate, state, more)
 
 
 def _map(function: Callable[..., Any], *states: Any) -> Any:
-    """A state built like the first, with `function` of what the states hold at each place."""
+    """Apply `function` to the leaves of states with the same structure."""
     first = states[0]
     if first is None:
         return None
@@ -51,7 +53,7 @@ def _map(function: Callable[..., Any], *states: Any) -> Any:
         return {name: _map(function, *(state[name] for state in states)) for name in first}
     if isinstance(first, tuple | list):
         parts = [_map(function, *leaves) for leaves in zip(*states, strict=True)]
-        # A named tuple takes its fields one by one.
+        # A named tuple takes its fields as separate arguments.
         return type(first)(*parts) if hasattr(first, "_fields") else type(first)(parts)
     return function(*states)
 

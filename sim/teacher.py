@@ -12,24 +12,24 @@ from sim.checks import real_rows
 from sim.sensors import LIGHT_MAX, SENSORS
 
 OBSTACLE = 0.22
-"""An obstacle is sensed below this distance, m. No edge of 16, 20, 24, 32, 48 or 64 equal bins over the sensor's range
-lies on it, so a learner that bins the range equally is not handed the threshold."""
+"""An obstacle is sensed below this distance, m. It is no edge of 16, 20, 24, 32, 48 or 64 equal bins over the sensor's
+range: a learner with equal bins does not get the threshold for free."""
 
-RULES: tuple[str, ...] = ("stay_in_light", "turn_left_to_light", "turn_right_to_light", "avoid_obstacle", "cruise")
-"""The rules in order; the first whose condition holds fires."""
+TEACHER_RULES = ("stay_in_light", "turn_left_to_light", "turn_right_to_light", "avoid_obstacle", "cruise")
+"""Names of the rules, in order. The first one whose condition holds fires."""
 
 BEHAVIOURS: dict[str, tuple[int, ...]] = {"seek_light": (0, 1, 2), "avoid": (3,), "cruise": (4,)}
-"""The behaviours that the rules make up: name -> indices into `RULES`."""
+"""Groups of rules that form a behaviour: name -> indices into `TEACHER_RULES`."""
 
-COMMANDS: NDArray[np.float64] = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
-"""What each rule commands `[5, 2]`: left and right wheel."""
-COMMANDS.flags.writeable = False
+TEACHER_COMMANDS: NDArray[np.float64] = np.array([[1.0, 1.0], [-1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]])
+"""The command of each rule `[5, 2]`: left and right wheel."""
+TEACHER_COMMANDS.flags.writeable = False
 
 
 class Teacher:
-    """The rules as a policy: `teacher(sensors [B, 3]) -> commands [B, 2]`, each command exactly -1 or +1.
+    """The rules as a function: `teacher(sensors [B, 3]) -> commands [B, 2]`, each command exactly -1 or +1.
 
-    Light is sensed where the reading is below `light_below`, an obstacle where it is below `obstacle_below`.
+    Light is sensed if its reading is below `light_below`, an obstacle if the distance is below `obstacle_below`.
     """
 
     def __init__(self, light_below: float = LIGHT_MAX, obstacle_below: float = OBSTACLE) -> None:
@@ -37,10 +37,13 @@ class Teacher:
         self.obstacle_below = obstacle_below
 
     def rule(self, sensors: NDArray[np.float64]) -> NDArray[np.int64]:
-        """Index into `RULES` of the rule that fires, `[B]`. Raises `ValueError` unless `sensors` is `[B, 3]`."""
+        """The index into `TEACHER_RULES` of the rule that fires, `[B]`.
+
+        Raises `ValueError` unless `sensors` is `[B, 3]`.
+        """
         sensors = real_rows("sensors", sensors)
         if sensors.ndim != 2 or sensors.shape[1] != len(SENSORS):
-            names = ", ".join(name for name, *_ in SENSORS)
+            names = ", ".join(sensor.name for sensor in SENSORS)
             raise ValueError(f"sensors have shape {sensors.shape}; expected [B, {len(SENSORS)}] ({names})")
         left, right = (sensors[:, :2] < self.light_below).T
         obstacle = sensors[:, 2] < self.obstacle_below
@@ -49,4 +52,4 @@ class Teacher:
 
     def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commands `[B, 2]` for `sensors` `[B, 3]`."""
-        return COMMANDS[self.rule(sensors)]
+        return TEACHER_COMMANDS[self.rule(sensors)]

@@ -1,4 +1,4 @@
-"""Vector Symbolic Architectures in PyTorch: batched, exact where integers allow, and plain tensors throughout."""
+"""Vector Symbolic Architectures in PyTorch: batched operations on plain tensors, exact for integers."""
 
 from torchvsa import encoders
 from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture

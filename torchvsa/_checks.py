@@ -1,19 +1,20 @@
-"""Check what callers give: whole numbers, types, and values where looking at them is cheap."""
+"""Check arguments: whole numbers, types, and values where reading them is cheap."""
 
 import operator
+from collections.abc import Callable
 from typing import Any, cast
 
 import torch
 from torch import Tensor
 
 INTEGERS = (torch.int8, torch.uint8, torch.int16, torch.int32, torch.int64)
-"""The types that shifts, indices and integer weights may have; PyTorch computes little with the other unsigned ones."""
+"""The types of shifts, indices and integer weights. PyTorch computes little with the other unsigned types."""
 INT32_MAX = 2**31 - 1
 _INT64_MAX = 2**63 - 1
 
 
 def whole_number(value: Any, what: str) -> int:
-    """`value` as a plain int (NumPy integers too); raises `ValueError` for anything else, truth values included."""
+    """An int or a NumPy integer as an int. Raises `ValueError` that begins with `what` for anything else."""
     try:
         if isinstance(value, bool):
             raise TypeError
@@ -22,30 +23,37 @@ def whole_number(value: Any, what: str) -> int:
         raise ValueError(f"{what}; got {value!r}") from None
 
 
+_SEARCHED = 2**20
+"""How far `nearest` searches in each direction; about a second."""
+
+
+def nearest(allows: Callable[[int], bool], number: int) -> str:
+    """Text that names the nearest positive numbers below and above `number` for which `allows` holds."""
+    below, above = range(number - 1, 0, -1)[:_SEARCHED], range(number + 1, number + 1 + _SEARCHED)
+    found = [next(filter(allows, side), None) for side in (below, above)]
+    names = [str(other) for other in found if other is not None]
+    return f"the nearest allowed: {' and '.join(names)}" if names else f"none within {_SEARCHED:,} of it is allowed"
+
+
 _C = cast(Any, torch._C)
 
 
 def mapped(*tensors: Tensor) -> bool:
-    """Whether one of the tensors is one that `vmap` or another transform looks through."""
+    """Whether one of the tensors is wrapped by `vmap` or another transform of `torch.func`."""
     return not torch.compiler.is_compiling() and any(map(_C._functorch.is_functorch_wrapped_tensor, tensors))
 
 
 def _mapped_or_traced(x: Tensor) -> bool:
-    """Whether a graph is being made, or the tensor is one that `vmap` or another transform looks through."""
+    """Whether a graph is being compiled or traced, or the tensor is wrapped by a transform of `torch.func`."""
     return torch.compiler.is_compiling() or _C._get_tracing_state() is not None or mapped(x)
 
 
 def readable(*tensors: Tensor) -> bool:
-    """Whether the values can be looked at now: on a CPU, outside of compiled and exported graphs and of `vmap`.
+    """Whether values can be read without cost: on a CPU, outside of compiled and exported graphs and of `vmap`.
 
-    On another device that would wait for all of its work, and in a graph or in `vmap` there are no values yet.
+    Another device would have to finish its work first, and a graph or `vmap` has no values yet.
     """
     return all(x.device.type == "cpu" and not _mapped_or_traced(x) for x in tensors)
-
-
-def assertable(x: Tensor) -> bool:
-    """Whether another device than the CPU can check the values by itself, without being waited for."""
-    return x.device.type != "cpu" and not _mapped_or_traced(x)
 
 
 def largest(x: Tensor) -> int:
@@ -62,13 +70,13 @@ def type_bound(dtype: torch.dtype) -> int:
 
 
 def fits(bound: int, what: str) -> None:
-    """Raise `ValueError` if intermediate results up to `bound` cannot be computed in int64."""
+    """Raise `ValueError` if intermediate results up to `bound` do not fit int64."""
     if bound > _INT64_MAX:
         raise ValueError(f"{what} can reach {bound:,}, beyond int64 (2^63 - 1), in which it is computed; use floats")
 
 
 def narrowed(x: Tensor, dtype: torch.dtype, what: str) -> Tensor:
-    """`x` in a smaller integer type; raises `ValueError` if it does not fit, where values can be looked at."""
+    """`x` in a smaller integer type. Raises `ValueError` if a value does not fit, where values are readable."""
     limit = torch.iinfo(dtype).max
     if readable(x) and (reached := largest(x)) > limit:
         name = str(dtype).removeprefix("torch.")
@@ -77,6 +85,6 @@ def narrowed(x: Tensor, dtype: torch.dtype, what: str) -> Tensor:
 
 
 def refuse_nan(x: Tensor, what: str) -> None:
-    """Raise `ValueError` if `x` holds NaN, where values can be looked at."""
+    """Raise `ValueError` if `x` holds NaN, where values are readable."""
     if readable(x) and x.isnan().any():
         raise ValueError(f"{what} holds NaN, which has no sign")

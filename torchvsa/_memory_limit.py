@@ -1,16 +1,20 @@
-"""Refuse what cannot fit into memory, before any of it is taken."""
+"""Refuse work that does not fit into memory, before any is allocated."""
 
 import os
 
 _SMALL = 2**26
-"""Bytes below which the system is not asked, which takes as long as drawing many small hypervectors."""
+"""Bytes below which the system is not asked: asking takes as long as drawing many small hypervectors."""
 
 
 def require_memory(needed: int, what: str, advice: str) -> None:
     """Raise `ValueError` if `needed` bytes are more than the machine has available now.
 
-    `what` says what would take them, `advice` what to do instead. Only a CPU's memory is looked at, and not at all for
-    less than 64 MiB.
+    Checks only the memory of the CPU, and nothing below 64 MiB.
+
+    Args:
+        needed: Bytes.
+        what: The work that needs them, for the error.
+        advice: What to do instead, for the error.
     """
     if needed < _SMALL:
         return
@@ -20,7 +24,7 @@ def require_memory(needed: int, what: str, advice: str) -> None:
 
 
 def _available() -> int:
-    """Bytes that can be taken without swapping; all physical memory where the system does not say."""
+    """Bytes available without swapping; all physical memory if the system does not tell."""
     try:
         with open("/proc/meminfo", encoding="ascii") as file:
             for line in file:
@@ -35,6 +39,6 @@ def _available() -> int:
 
 
 def _size(count: int) -> str:
-    """A number of bytes, to three digits, in the unit that suits it."""
+    """A number of bytes with three digits and a suitable unit."""
     power = min(max((len(str(count)) - 1) // 3, 0), 4)
     return f"{count / 1000**power:,.3g} {('bytes', 'kB', 'MB', 'GB', 'TB')[power]}"

@@ -1,9 +1,9 @@
 """Products and norms of hypervectors, exact wherever the type is an integer.
 
-The type says which path runs: boolean vectors count as -1 / +1, integer products are exact, complex ones are Hermitian
-and give their real part. Floats are brought into a range where squares fit, wherever they are out of it; a CPU looks
-for that at the lengths, while in graphs and on other devices, where a look would break or stall something, all of them
-are. The results are the same.
+The dtype selects the path: boolean vectors count as -1 / +1, integer products are exact, and complex products are the
+real part of the Hermitian product. Floats whose squares would overflow or vanish are scaled by a power of two. A CPU
+checks the lengths first; in graphs and on other devices, where reading values breaks or stalls, all floats are scaled.
+The results are the same.
 """
 
 import torch
@@ -16,30 +16,30 @@ from torchvsa._kernels.integer_products import integer_products
 
 
 def as_bipolar(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
-    """Bits as votes (False: +1, True: -1, so that XOR is a product); any other tensor as it is."""
+    """Convert bits to int8 (False: +1, True: -1, so that XOR is a product); return other tensors unchanged."""
     return 1 - 2 * x.to(torch.int8) if x.dtype == torch.bool else x
 
 
 def is_integer(x: Tensor) -> bool:
-    """Whether a tensor holds integers (bits included), whose sums and products are exact."""
+    """Whether a tensor holds integers or bits, whose sums and products are exact."""
     return not (x.is_floating_point() or x.is_complex())
 
 
 def real_parts(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch e"]:
-    """Complex vectors as real ones with the same products, real and imaginary parts in turns; any other as they are."""
+    """View complex vectors as interleaved real ones with the same products; return others unchanged."""
     return torch.view_as_real(x.resolve_conj()).flatten(-2) if x.is_complex() else x
 
 
-_FEW = 16
-"""Rows up to which it does not pay to square them in a type of their own."""
+_MAX_PLAIN_ROWS = 16
+"""Up to this number of rows, squaring int8 in float32 does not pay."""
 
 
 def inner_products(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k d"]) -> Shaped[Tensor, "*batch k"]:
     """The inner product of each query with each item.
 
-    Integers: int8 by int8 is exact, in int32, or in int64 from d = 131,041 on; anything wider is summed in float64,
-    exact as long as sums of absolute products stay below 2^53, and else rounded as float64 is.
-    Integers by floats: in the floats' type, but at least float32 for int8 and float64 for anything wider.
+    Integers: int8 by int8 is exact, in int32, or in int64 from d = 131,041 on. Wider types are summed in float64, exact
+    while sums of absolute products stay below 2^53.
+    Integers by floats: in the type of the floats, at least float32 for int8 and float64 for wider integers.
     Floats: in the wider of both types, at least float32.
     Complex: the real part of the Hermitian product.
     """
@@ -61,9 +61,9 @@ def inner_products(queries: Shaped[Tensor, "*batch d"], items: Shaped[Tensor, "k
 def paired_products(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
     """The inner product of a with b, element by element of the (broadcast) batch.
 
-    Integers: exact, in int64, where their types and d prove that it fits (int8 by anything up to int32, say).
-    Otherwise in float64: the exact sum if it is below 2^62, rounded once, and else summed in float64. Integers wider
-    than int16 by floats count as float64; half precision as float32.
+    Integers: exact, in int64, if their types and d prove that the sum fits (for example int8 by int32). Otherwise in
+    float64: the exact sum, rounded once, if it is below 2^62, else a sum in float64.
+    Integers wider than int16 by floats: the integers count as float64. Half precision counts as float32.
     """
     a, b = widened(a), widened(b)
     if a.is_complex() or b.is_complex():
@@ -71,12 +71,12 @@ def paired_products(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d
     if not (is_integer(a) and is_integer(b)):
         a, b = (x.to(torch.float64) if is_integer(x) and x.dtype.itemsize > 2 else x for x in (a, b))
         return (a * b).sum(-1)
-    # A product of two int8 fits int16, which moves a quarter of the bytes.
+    # A product of two int8 numbers fits int16, a quarter of the bytes of int64.
     wide = torch.int16 if a.dtype == b.dtype == torch.int8 else torch.int64
     whole = (a.to(wide) * b).sum(-1, dtype=torch.int64)
     if type_bound(a.dtype) * type_bound(b.dtype) * max(a.shape[-1], b.shape[-1]) < 2**63:
         return whole
-    # Sums of integers wrap around without harm if the result fits. This says where it does, without a look at values.
+    # Integer sums that wrap around on the way are right if the result fits. The estimate says whether it does.
     estimate = (a.to(torch.float64) * b).sum(-1)
     return torch.where(estimate.abs() < 2.0**62, whole.to(torch.float64), estimate)
 
@@ -84,31 +84,31 @@ def paired_products(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d
 def norms(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
     """Euclidean length in float64, with a gradient of 0 at the zero vector.
 
-    Integers: the root of `paired_products`. Floats: correct at any scale; NaN where an element is NaN or infinite.
+    Integers: the square root of `paired_products`. Floats: correct at any scale; NaN if an element is NaN or infinite.
     """
-    if x.dtype == torch.int8 and x.dim() == 2 and not torch.compiler.is_exporting() and len(x) > _FEW:
+    if x.dtype == torch.int8 and x.dim() == 2 and not torch.compiler.is_exporting() and len(x) > _MAX_PLAIN_ROWS:
         return safe_sqrt(by_blocks(_int8_squares, x, row_bytes=4 * x.shape[-1]))
     _, lengths, unit = in_range(x)
     return lengths if unit is None else lengths * unit[..., 0].to(torch.float64)
 
 
 def cosines(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch"]:
-    """The cosine of a with b, element by element of the (broadcast) batch, in float64 and independent of scale."""
+    """The cosine of a and b, element by element of the (broadcast) batch, in float64; independent of scale."""
     (a, a_lengths, _), (b, b_lengths, _) = in_range(a), in_range(b)
     return safe_divide(paired_products(a, b), a_lengths * b_lengths)
 
 
 def widened(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
-    """Bits as votes, half precision as float32; any other tensor as it is."""
+    """Convert bits to -1 / +1 and half precision to float32; return other tensors unchanged."""
     return x.to(torch.float32) if x.dtype in (torch.float16, torch.bfloat16) else as_bipolar(x)
 
 
 _SHORTEST, _LONGEST = 2.0**-30, 2.0**50
-"""Lengths between which squares and products of two vectors neither overflow in float32 nor lose digits."""
+"""Between these lengths, squares and products of two vectors neither overflow in float32 nor lose digits."""
 
 
 def ordinary(lengths: Shaped[Tensor, "*batch"]) -> bool:
-    """Whether all lengths are seen to be of ordinary size; False where values cannot be looked at."""
+    """Whether all lengths are within `_SHORTEST` and `_LONGEST`; False where values are not readable."""
     if not readable(lengths) or lengths.numel() == 0:
         return lengths.numel() == 0
     low, high = torch.aminmax(lengths.detach())
@@ -116,14 +116,13 @@ def ordinary(lengths: Shaped[Tensor, "*batch"]) -> bool:
 
 
 def units(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch 1"]:
-    """A power of two for each vector, by which to divide it so that its largest element is from 1 to 2.
+    """A power of two per vector; divided by it, the largest absolute element is from 1 to 2.
 
-    Dividing by a power of two rounds nothing, so that results keep their bits. 1 for a zero vector, NaN where an
-    element is NaN or infinite.
+    Dividing by a power of two does not round. 1 for a zero vector, NaN if an element is NaN or infinite.
     """
     largest = x.detach().abs().amax(-1, keepdim=True)
     if torch.compiler.is_exporting():
-        power = torch.exp2(torch.log2(largest).floor())  # interchange formats lack the exact way
+        power = torch.exp2(torch.log2(largest).floor())  # ONNX lacks `frexp`, which is exact
     else:
         power = largest / (2 * torch.frexp(largest).mantissa)
     return torch.where(largest == 0, torch.ones_like(power), power)
@@ -141,9 +140,10 @@ def _lengths(x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch"]:
 def in_range(
     x: Shaped[Tensor, "*batch d"],
 ) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch"], Shaped[Tensor, "*batch 1"] | None]:
-    """Vectors whose squares neither overflow nor vanish, their lengths in float64, and the `units` that divided them.
+    """Scale vectors so that their squares neither overflow nor vanish.
 
-    Ordinary vectors and integers are as they were (`widened`), and their units None.
+    Returns the vectors, their lengths in float64, and the `units` that divided them: None if nothing was scaled, as for
+    integers and floats of ordinary length (which are only `widened`).
     """
     x = widened(x)
     if is_integer(x):
@@ -151,13 +151,13 @@ def in_range(
     if readable(x) and ordinary(lengths := _lengths(x)):
         return x, lengths, None
     unit = units(x)
-    # A division of complex numbers would take products of them, which vanish.
+    # Dividing complex numbers would multiply them, and the products could vanish.
     x = torch.view_as_complex(torch.view_as_real(x.resolve_conj()) / unit[..., None]) if x.is_complex() else x / unit
     return x, safe_sqrt(paired_products(x, x)), unit
 
 
 def in_units(x: Shaped[Tensor, "*batch d"]) -> tuple[Shaped[Tensor, "*batch d"], Shaped[Tensor, "*batch 1"] | None]:
-    """Floats as `in_range` has them, with the `units` that divided them; integers and bits as they are."""
+    """Scale floats as `in_range` does, and return their `units` too; return integers and bits unchanged."""
     if is_integer(x):
         return x, None
     x, _, unit = in_range(x)
@@ -165,7 +165,7 @@ def in_units(x: Shaped[Tensor, "*batch d"]) -> tuple[Shaped[Tensor, "*batch d"],
 
 
 def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
-    # Floats are summed fastest, and are exact below 2^24, which 1,023 squares of int8 cannot reach.
+    # Floats are summed fastest. They are exact below 2^24, which 1,023 squares of int8 cannot reach.
     squares = x.to(torch.float32)
     squares *= squares
     return torch.stack([part.sum(-1).to(torch.float64) for part in squares.split(1023, -1)]).sum(0)
@@ -178,10 +178,10 @@ def safe_sqrt(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
 
 
 def safe_divide(values: Shaped[Tensor, "*s"], lengths: Shaped[Tensor, "*t"]) -> Shaped[Tensor, "*s"]:
-    """`values / lengths`, and 0 where the length is 0: a zero vector is similar to nothing."""
+    """`values / lengths`, or 0 if the length is 0: a zero vector is similar to nothing."""
     return torch.where(lengths == 0, 0.0, values / torch.where(lengths == 0, 1.0, lengths))
 
 
 def over_lengths(products: Shaped[Tensor, "*batch"], lengths: Shaped[Tensor, "*#batch"]) -> Shaped[Tensor, "*batch"]:
-    """`safe_divide` for products with vectors of these lengths; those with a zero vector are 0 already."""
+    """`safe_divide` for products with vectors of these lengths, which are 0 already for zero vectors."""
     return products / torch.where(lengths == 0, 1.0, lengths)

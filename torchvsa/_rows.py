@@ -1,10 +1,10 @@
-"""Encoders and protections for one row at a time, in NumPy: what a robot needs at every control tick.
+"""Encode and protect a single row in NumPy, for a robot's control loop.
 
-A single row takes PyTorch a hundred small steps of some microseconds; NumPy's take a tenth of that. The plain line is
-`protection(encoder(x))`; integers are equal in every bit, floats but for rounding. Measured by
+The plain line is `protection(encoder(x))`. For one row it takes PyTorch about a hundred calls of several microseconds;
+those of NumPy take a tenth. Integers are equal in every bit, floats up to rounding. Measured with
 `python -m benchmarks --only recall`.
 
-Parts are looked up by their very class: what derives from one of them may do something else, and takes the plain line.
+Parts are looked up by their exact class. A subclass may behave differently, and takes the plain line.
 """
 
 from collections.abc import Callable
@@ -21,25 +21,25 @@ from torchvsa.protection import FixedShift, Protection, SelfShift, Unprotected
 Array = NDArray[Any]
 Row = Callable[[Array], Array]
 ROUNDED = 1 + 2.0**-50
-"""See `binned`."""
+"""The allowance for rounding of `torchvsa.encoders.base.binned`."""
 
 
 class Verbs(NamedTuple):
-    """The verbs of an architecture on rows `[k, d]`."""
+    """The operations of an architecture on rows `[k, d]`."""
 
     bind: Row
     bundle: Row
     noise: Callable[[Array], Callable[[Array, Array], float]] | None = None
-    """For a program, what finds `|unbind(program, key)|²` of a key and its squares (see `real`).
+    """Maps a program to a function of a key and its squares (see `real`) that returns `|unbind(program, key)|²`.
 
-    None where that is a product of squares, as wherever `bind` acts element by element.
+    None if that is the product of the squares, as for element-wise binding.
     """
 
 
 def row_encoder(encoder: Encoder, protection: Protection) -> Row | None:
-    """`protection(encoder(x))` for a row of readings `[n]` in [0, 1], of which one at least is no NaN.
+    """A function equal to `protection(encoder(x))` for one row of readings `[n]` in [0, 1], not all of them NaN.
 
-    None for parts that have no such form, and on other devices than the CPU.
+    None for parts without a NumPy form, and on devices other than the CPU.
     """
     known = verbs(encoder.vsa)
     if known is None or type(encoder) not in _ENCODERS or type(protection) not in _PROTECTIONS:
@@ -52,22 +52,19 @@ def row_encoder(encoder: Encoder, protection: Protection) -> Row | None:
 
 
 def real(code: Array) -> Array:
-    """A hypervector in float64 with the same products: bits as votes, complex elements as pairs."""
+    """A hypervector in float64 with the same products: bits as -1 / +1, complex elements as pairs."""
     if code.dtype == np.bool_:
         return 1.0 - 2.0 * code
     return (code.view(np.real(code).dtype) if np.iscomplexobj(code) else code).astype(np.float64)
 
 
-# -- architectures --------------------------------------------------------------------------------------
-
-
 def verbs(vsa: VSA) -> Verbs | None:
-    """The verbs of an architecture, None if there are none for it."""
+    """The NumPy operations of an architecture; None if it has none."""
     return _VERBS[type(vsa)](vsa) if type(vsa) in _VERBS else None
 
 
 def noise(vsa: VSA, program: Array) -> Callable[[Array, Array], float]:
-    """What finds `|unbind(program, key)|²` of a key, as `real` has it, and its squares."""
+    """A function of a key in the form of `real` and its squares that returns `|unbind(program, key)|²`."""
     known = verbs(vsa)
     if known is not None and known.noise is not None:
         return known.noise(program)
@@ -88,7 +85,7 @@ def _sum(rows: Array) -> Array:
 def _map(vsa: Any) -> Verbs:
     def clipped(rows: Array) -> Array:
         total = _sum(rows)
-        # The sign of a whole number is what clipping leaves of it, and found far faster.
+        # For integers the sign equals the clipped value, and is far faster.
         return np.sign(total).astype(rows.dtype, copy=False) if vsa.integer else total.clip(-1, 1)
 
     def majority(rows: Array) -> Array:
@@ -127,7 +124,7 @@ def _hrr(vsa: VSA) -> Verbs:
         return raw / (np.linalg.norm(raw) or 1)
 
     def noise(program: Array) -> Callable[[Array, Array], float]:
-        # By Parseval's theorem; but for the ends, each frequency of a real vector stands for two.
+        # Parseval's theorem; every frequency of a real vector counts twice, except the first and, for even d, the last.
         power = np.abs(np.fft.rfft(program)) ** 2 * 2 / vsa.dim
         power[0] /= 2
         if vsa.dim % 2 == 0:
@@ -138,8 +135,6 @@ def _hrr(vsa: VSA) -> Verbs:
 
 
 _VERBS: dict[type, Callable[[Any], Verbs]] = {MAP: _map, BSC: _bsc, FHRR: _fhrr, HRR: _hrr}
-
-# -- encoders -------------------------------------------------------------------------------------------
 
 
 def _record(encoder: Any, join: Row) -> Row | None:
@@ -164,9 +159,9 @@ def _thresholds(encoder: Any, _: Verbs) -> Row | None:
         return None
     vsa, bins = encoder.vsa, encoder.bins
     start, negative = encoder.start_codes.numpy(), vsa.negative(encoder.start_codes).resolve_neg().numpy()
-    # Small numbers are compared several at once.
+    # int32 compares faster than int64.
     sensor, threshold, above = encoder.sensor.numpy(), encoder.threshold.int().numpy(), encoder.above.numpy()
-    questions = list(zip(sensor, threshold, above, strict=True))
+    comparisons = list(zip(sensor, threshold, above, strict=True))
     edges = encoder.edges.numpy() if hasattr(encoder, "edges") else None
 
     def encode(x: Array) -> Array:
@@ -175,12 +170,12 @@ def _thresholds(encoder: Any, _: Verbs) -> Row | None:
         missing = bool(unseen.any())
         cells = (np.where(unseen, -1, found) if missing else found).astype(np.int32)
         against, blind = np.zeros(vsa.dim, np.bool_), missing
-        for sensor, threshold, above in questions:
-            asked = cells.take(sensor)
-            apart = (asked > threshold) != above
+        for sensor, threshold, above in comparisons:
+            compared = cells.take(sensor)
+            apart = (compared > threshold) != above
             if missing:
-                apart &= asked >= 0
-                blind = blind & (asked < 0)
+                apart &= compared >= 0
+                blind = blind & (compared < 0)
             against |= apart
         return np.where(against | blind if missing else against, start, negative)
 
@@ -193,8 +188,6 @@ _ENCODERS: dict[type, Callable[[Any, Verbs], Row | None]] = {
     SubsetProduct: lambda encoder, known: _record(encoder, known.bind),
     ThresholdFeatures: _thresholds,
 }
-
-# -- protections ----------------------------------------------------------------------------------------
 
 
 def _rolled(x: Array, shift: int) -> Array:
@@ -212,8 +205,8 @@ def _self_shift(protection: Any, known: Verbs) -> Row:
     def protect(x: Array) -> Array:
         pair = np.empty((2, dim), x.dtype)
         pair[1] = name
-        places = np.flatnonzero(~x if x.dtype == np.bool_ else np.real(x) > 0)
-        count, total = len(places), int(places.sum())
+        positions = np.flatnonzero(~x if x.dtype == np.bool_ else np.real(x) > 0)
+        count, total = len(positions), int(positions.sum())
         width = total % dim if protection.width_rule == "sum" else (2 * total + count) // max(2 * count, 1)
         pair[0] = x
         return _rolled(bundle(pair), width)

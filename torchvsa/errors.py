@@ -1,4 +1,4 @@
-"""Errors that tell a person what was given, what was expected, and what to do."""
+"""Errors of this package."""
 
 
 class ShapeError(ValueError):

@@ -1,7 +1,7 @@
-"""Protection: a permutation that hides a hypervector's structure from the vectors it is bundled with.
+"""Protection: permutations that make similar hypervectors dissimilar before they are bundled.
 
-The paper protects every condition, so that conditions which share sensor values do not blur each other. A
-protection has two verbs: `protect(x)` and `protect.invert(y)`.
+Neubert et al. protect every condition, so that conditions with common sensor values do not interfere. A protection has
+two methods: `protect(x)` and `protect.invert(y)`.
 """
 
 from abc import abstractmethod
@@ -23,7 +23,10 @@ from torchvsa.registry import Registry
 
 
 class Protection(Part):
-    """A map of hypervectors to hypervectors `[..., d] -> [..., d]`, with an inverse (exact or estimated)."""
+    """A map of hypervectors, `[..., d] -> [..., d]`, with an exact or estimated inverse.
+
+    A new protection implements `forward` and `invert`, and what `Part` asks for.
+    """
 
     @abstractmethod
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
@@ -34,14 +37,14 @@ class Protection(Part):
         """Recover `x` from `y = protect(x)`."""
 
     def own_layout(self) -> Layout:
-        """Nothing of its own."""
+        """No tensors."""
         return {}
 
     def _draw(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
         return {}
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name."""
         return {"name": self.name}
 
 
@@ -65,7 +68,7 @@ class Unprotected(Protection):
 
 
 class FixedShift(Protection):
-    """A circular right shift by the same `shift` for all: quotes a vector, keeps every similarity."""
+    """Rotates every hypervector to the right by the same `shift`, which keeps all similarities."""
 
     name = "fixed_shift"
 
@@ -76,42 +79,42 @@ class FixedShift(Protection):
         self._own(None)
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Shift to the right."""
+        """Rotate to the right by `shift`."""
         return self.vsa.permute(x, self.shift)
 
     def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Shift back."""
+        """Rotate back."""
         return self.vsa.permute(y, -self.shift)
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name and the shift."""
         return {"name": self.name, "shift": self.shift}
 
 
 class SelfShift(Protection):
-    """The paper's: shift by a width `w` computed from the vector itself, and superpose the name of `w`.
+    """Rotates each hypervector by a width w(x) derived from itself, and bundles in a hypervector that encodes w.
 
-        protect(x) = shift(bundle(x, h), w(x))
+        protect(x) = permute(bundle([x, h]), w(x))
 
-    for one random hypervector `h`: the name of the width is `H[w] = shift(h, w)`, so that all d names cost d
-    numbers and are near-orthogonal.
+    `h` is one random hypervector. `permute(h, w)` encodes the width w: the d codes are nearly orthogonal, and only `h`
+    is stored.
 
     | `width` | w | |
     |---|---|---|
-    | `"mean"` | average index of the elements > 0, rounded half up | the paper's; about √(d/12) widths around d/2 |
-    | `"sum"` | sum of those indices, mod d | spreads evenly over all d widths |
+    | `"mean"` | average index of the elements > 0, rounded half up | as published; about √(d/12) widths around d/2 |
+    | `"sum"` | sum of those indices, mod d | uniform over all d widths |
 
-    Widths come from exact integer sums, so they do not depend on batch size, type or device. No element
-    above 0 gives width 0.
+    Widths are exact integer sums and do not depend on batch size, type or device. Without an element above 0 the width
+    is 0.
 
-    It acts as a hash: conditions that differ in one of three sensors become all but unrelated.
+    Acts as a hash: conditions that differ in one of three sensors become nearly unrelated.
     Source: Neubert et al. 2016, section II.
     """
 
     name = "self_shift"
     h: Tensor
-    columns: Tensor
-    places: Tensor
+    index_digits: Tensor
+    digit_values: Tensor
 
     def __init__(
         self,
@@ -125,28 +128,28 @@ class SelfShift(Protection):
         if width not in ("mean", "sum"):
             raise ValueError(f"the width of a self-derived shift is 'mean' or 'sum'; got {width!r}")
         self.width_rule = width
-        count = _places(vsa.dim)
-        # The columns are computed in int64, in three steps.
+        count = _digit_count(vsa.dim)
+        # `derive` computes in int64 and holds three such tensors.
         require_memory(8 * (3 * count + 2) * vsa.dim, f"a self-derived shift of d = {vsa.dim}", "take fewer dimensions")
         if h is not None and h.shape != (vsa.dim,):
             raise ShapeError(f"h must be one hypervector of d = {vsa.dim} elements; got shape {tuple(h.shape)}")
         if h is not None and h.dtype != vsa.dtype:
             raise ValueError(f"h must be a hypervector of {vsa}; got {h.dtype}")
-        self.register_buffer("columns", None, persistent=False)
-        self.register_buffer("places", None, persistent=False)
+        self.register_buffer("index_digits", None, persistent=False)
+        self.register_buffer("digit_values", None, persistent=False)
         self._own(seed if h is None else None)
         if h is not None:
             self.h = h
             self.derive()
 
     def derive(self) -> None:
-        """Compute the columns that find widths, which depend on the number of dimensions alone."""
-        # Indices in base 128, so that their sums are exact products of int8 on any device.
+        """Compute the digits of all indices, from which `width` sums; they depend only on d."""
+        # Digits in base 128 fit int8, whose products sum exactly on every device.
         dim, device = self.vsa.dim, self.h.device
-        places = 128 ** torch.arange(_places(dim), device=device)
-        digits = torch.arange(dim, device=device) // places[:, None] % 128
+        values = 128 ** torch.arange(_digit_count(dim), device=device)
+        digits = torch.arange(dim, device=device) // values[:, None] % 128
         ones = torch.ones(1, dim, dtype=torch.int64, device=device)
-        self.columns, self.places = torch.cat([ones, digits]).to(torch.int8), places
+        self.index_digits, self.digit_values = torch.cat([ones, digits]).to(torch.int8), values
 
     def own_layout(self) -> Layout:
         """`h` `[d]`."""
@@ -158,23 +161,23 @@ class SelfShift(Protection):
     def width(self, x: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
         """The shift width of each vector, an integer in [0, d)."""
         rows = x.reshape(-1, self.vsa.dim)
-        sums = by_blocks(self._sums, rows, row_bytes=self.vsa.dim).reshape(*x.shape[:-1], len(self.columns))
+        sums = by_blocks(self._sums, rows, row_bytes=self.vsa.dim).reshape(*x.shape[:-1], len(self.index_digits))
         sums = sums.to(torch.int64)
-        count, total = sums[..., 0], (sums[..., 1:] * self.places).sum(-1)
+        count, total = sums[..., 0], (sums[..., 1:] * self.digit_values).sum(-1)
         if self.width_rule == "sum":
             return total % self.vsa.dim
         return (2 * total + count) // (2 * count).clamp(min=1)
 
-    def _sums(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch columns"]:
-        """How many elements are > 0, and the sums of the digits of their indices."""
+    def _sums(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch digits"]:
+        """The number of elements above 0, and the sum of each digit of their indices."""
         if is_integer(rows) and rows.dtype != torch.bool:
-            marks = rows.clamp(0, 1).to(torch.int8)  # several times faster than comparing, and the same for integers
+            marks = rows.clamp(0, 1).to(torch.int8)  # equals `> 0` for integers, and is several times faster
         else:
             marks = self.vsa.positive(rows).to(torch.int8)
-        return inner_products(marks, self.columns)
+        return inner_products(marks, self.index_digits)
 
     def forward(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Superpose `x` with `h`, then shift by the width of `x`."""
+        """Bundle `x` with `h`, then rotate by the width of `x`."""
         self.vsa.check(x, "x")
         self._require_drawn()
         # In blocks, rows stay in the cache between the steps.
@@ -185,7 +188,7 @@ class SelfShift(Protection):
         return self.vsa.permute(self.vsa._bundle_pair(rows, self.h.to(rows.dtype)), self.width(rows))
 
     def decode(self, y: Shaped[Tensor, "*batch d"]) -> Int[Tensor, "*batch"]:
-        """The width hidden in `y = protect(x)`: the shift at which `h` correlates best with `y`."""
+        """The width encoded in `y = protect(x)`: the shift at which `h` correlates best with `y`."""
         if y.numel() == 0:
             # The Fourier transform refuses an empty batch.
             return torch.zeros(y.shape[:-1], dtype=torch.int64, device=y.device)
@@ -193,24 +196,24 @@ class SelfShift(Protection):
         return torch.fft.ifft(spectrum * reference.conj()).real.argmax(-1)
 
     def invert(self, y: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Decode the width, shift back and take `h` out.
+        """Decode the width, rotate back and remove `h`.
 
-        Exact for bipolar x in MAP-C and MAP-I (where the superposition is 0, x = -h), up to rounding in
-        FHRR; an estimate, similar to x, for other x and in the other architectures.
+        Exact for x of -1 / +1 in MAP-C and MAP-I, exact up to rounding in FHRR. Otherwise an estimate that is similar
+        to x.
         """
         return self.vsa.unbundle(self.vsa.permute(y, -self.decode(y)), self.h.to(y.dtype))
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`; `h` itself is a tensor."""
+        """The name and the rule of the width; `h` is a tensor."""
         return {"name": self.name, "width": self.width_rule}
 
 
-def _places(dim: int) -> int:
-    """Digits in base 128 of the largest index."""
-    places = 1
-    while 128**places < dim:
-        places += 1
-    return places
+def _digit_count(dim: int) -> int:
+    """The number of digits of the largest index in base 128."""
+    count = 1
+    while 128**count < dim:
+        count += 1
+    return count
 
 
 def _floats(x: Tensor) -> Tensor:
@@ -224,5 +227,5 @@ PROTECTIONS: Registry[type[Protection]] = Registry(
 
 
 def protection(config: Mapping[str, Any], vsa: VSA) -> Protection:
-    """The protection that a `config()` describes, as a plan."""
+    """Make the protection that `config()` describes, without drawn tensors."""
     return PROTECTIONS.find(config.get("name")).from_config(config, vsa)

@@ -1,4 +1,4 @@
-"""Read items out of programs: unbind a condition, compare what is left with the items."""
+"""Read items out of programs: unbind a condition, then compare the result with the items."""
 
 from typing import TYPE_CHECKING
 
@@ -16,21 +16,21 @@ if TYPE_CHECKING:
 
 
 class Readout(nn.Module):
-    """How strongly programs answer conditions with items: `<unbind(program, condition), item> / |item|`.
+    """Scores of items for conditions: `<unbind(program, condition), item> / |item|`.
 
         readout = vsa.readout(programs, items)
         readout(conditions)              # scores, [B, K] or [B, b, K]
         readout.match(conditions)        # the best item of each: index, similarity, margin
 
-    `programs` is one hypervector `[d]` or a stack `[b, d]`, raw accumulators included; `items` are `[K, d]`. Where
+    `programs` is one hypervector `[d]` or a stack `[b, d]`, which may be raw accumulators; `items` are `[K, d]`. If
     `bind` is bilinear, programs are folded into the items, `<unbind(p, c), item> = <fold(p, item), c>`, so that a batch
-    of conditions is one matrix product (see `VSA.fold`); elsewhere the steps are taken one after the other.
+    of conditions takes one matrix product (see `VSA.fold`). Otherwise conditions are unbound and compared in turn.
 
-    Products of integers are exact: their scores depend neither on the batch nor on threads. Scores are float64 and
-    differentiable by programs and conditions.
+    Products of integers are exact, so their scores depend neither on the batch nor on threads. Scores are float64 and
+    differentiable with respect to programs and conditions.
 
-    A readout holds what was folded; later changes of `programs` and `items` do not reach it. `of` makes one for other
-    programs over the same items.
+    Later changes of `programs` and `items` do not affect a readout. `of` makes one for other programs and the same
+    items.
 
     Source: Neubert et al. 2016, Algorithm 2, lines 2 and 3. Raises `ShapeError` for other shapes.
     """
@@ -56,7 +56,7 @@ class Readout(nn.Module):
                 f"a readout takes programs [d] or [b, d] and items [K, d], K at least 1; got shapes "
                 f"{tuple(programs.shape)} and {tuple(items.shape)}"
             )
-        # Scores grow with the program, cosines do not: powers of two bring floats into range, and change no digit.
+        # Powers of two bring floats into range without rounding. Scores are scaled back; cosines need not be.
         programs, units = in_units(programs)
         if lengths is None:
             items, _ = in_units(items)
@@ -68,7 +68,7 @@ class Readout(nn.Module):
             self.register_buffer(name, tensor, persistent=False)
 
     def of(self, programs: Shaped[Tensor, "*b d"]) -> "Readout":
-        """A readout of other programs with the same items, whose lengths are known already."""
+        """A readout of other programs with the same items; reuses the lengths of the items."""
         return Readout(self.vsa, programs, self.items, self.lengths)
 
     def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
@@ -77,9 +77,9 @@ class Readout(nn.Module):
         return scores if self.units is None else scores * self.units.to(torch.float64)
 
     def match(self, conditions: Shaped[Tensor, "batch d"]) -> Match:
-        """The item that resembles each noisy result most: `[B]` or `[B, b]`, see `CleanUp`."""
+        """The best item for each condition, `[B]` or `[B, b]`, with its cosine and margin (see `CleanUp`)."""
         if self.vsa.bilinear and is_integer(conditions):
-            # Products and lengths are found in float64, in which a row need be written once only.
+            # Products and lengths both take float64; convert once.
             conditions = as_bipolar(conditions).to(torch.float64)
         products = self._products(conditions)
         return best(over_lengths(products.to(torch.float64), self.lengths), self._noise(conditions))
@@ -103,6 +103,6 @@ class Readout(nn.Module):
 
 
 def _wide(programs: Tensor, items: Tensor) -> Tensor:
-    """Programs in a type that holds their products with the items: items that are sums themselves may pass int32."""
+    """Programs in a type that holds their products with the items, which exceed int32 if both are int32 sums."""
     sums = is_integer(programs) and is_integer(items) and programs.element_size() == items.element_size() == 4
     return programs.to(torch.int64) if sums else programs

@@ -1,4 +1,4 @@
-"""Parts by name, for settings and files; the parts themselves are made by their classes."""
+"""Registries: classes by name, for settings and files."""
 
 from collections.abc import Iterator, Mapping
 from typing import Generic, TypeVar
@@ -9,9 +9,9 @@ T = TypeVar("T")
 
 
 class Registry(Mapping[str, T], Generic[T]):
-    """Named parts of one kind. A part from outside joins by `register`, see `torchvsa.plugins`.
+    """A mapping of names to parts of one kind. `register` adds a part (see `torchvsa.plugins`).
 
-    Installed plugins are imported when they are needed: for a name that is not there, and for a list of all names.
+    Installed plugins are imported at the first look-up of an unknown name, and at the first listing of all names.
 
     >>> from torchvsa.registry import Registry
     >>> rules = Registry("learning rule")
@@ -26,10 +26,10 @@ class Registry(Mapping[str, T], Generic[T]):
         self._parts: dict[str, T] = dict(parts or {})
 
     def register(self, name: str, part: T) -> None:
-        """Add a part. Raises `ValueError` if another one has the name already.
+        """Add a part. Raises `ValueError` if another part has the name already.
 
-        A class or function of the same module and name takes the place of the former one, as when a module is
-        reloaded or a cell of a notebook runs again.
+        A class or function with the same module and qualified name replaces the earlier one, as when a module is
+        reloaded or a notebook cell runs again.
         """
         if not isinstance(name, str) or not name:
             raise ValueError(f"the name of a {self.kind} is a text that is not empty; got {name!r}")
@@ -42,7 +42,7 @@ class Registry(Mapping[str, T], Generic[T]):
         self._parts[name] = part
 
     def find(self, name: object) -> T:
-        """The part of this name. Raises `ValueError` that lists the names there are, and plugins that failed."""
+        """The part of this name. Raises `ValueError` that lists all names, and the plugins that failed."""
         if isinstance(name, str) and name in self:
             return self._parts[name]
         message = f"there is no {self.kind} {name!r}; choose one of {', '.join(self)}"
@@ -73,7 +73,7 @@ def _where(part: object) -> tuple[str, str] | None:
 
 def _defined_again(a: object, b: object) -> bool:
     where = _where(a)
-    # Functions make any number of classes of one name.
+    # A function can make many classes with the same name.
     return where is not None and where == _where(b) and "<locals>" not in where[1]
 
 

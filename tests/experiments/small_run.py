@@ -94,7 +94,7 @@ def report(folder: Path, *names: str, **config: object) -> str:
         ).read_text()
 
 
-def _drive(policy: sim.Policy, episodes: range, body: str = "planar") -> sim.Rollout:
+def _drive(policy: sim.ControllerLike, episodes: range, body: str = "planar") -> sim.Rollout:
     return sim.rollout(policy, body=body, episodes=episodes, seconds=10, robots=8)
 
 

@@ -66,7 +66,8 @@ def test_the_paper_preset_is_literal() -> None:
 def test_the_default_has_enough_bins_and_none_of_its_edges_is_a_threshold_of_the_teacher() -> None:
     bins = settings()["encoder"]["bins"]
     assert bins >= 16
-    low, high = sim.SENSORS[2][1:3]
+    distance = sim.SENSORS[2]
+    low, high = distance.low, distance.high
     edges = low + (high - low) * np.arange(1, bins) / bins
     # At least a tenth of a bin away.
     assert np.abs(edges - sim.Teacher().obstacle_below).min() > 0.1 * (high - low) / bins

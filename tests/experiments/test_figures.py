@@ -51,9 +51,9 @@ def test_a_map_is_the_recall_cell_by_cell(who: str, plane: Slice) -> None:
         for column in range(bins):
             reading = np.empty(3)
             for sensor, place in ((plane.x, column), (plane.y, row)):
-                high = sim.SENSORS[sensor][2]
+                high = sim.SENSORS[sensor].high
                 reading[sensor] = high if place == bins - 1 else high * (place + 0.5) / bins
-            high = sim.SENSORS[plane.third][2]
+            high = sim.SENSORS[plane.third].high
             place = min(int(plane.fixed / high * bins), bins - 1)
             reading[plane.third] = high if place == bins - 1 else high * (place + 0.5) / bins
             np.testing.assert_allclose(shown.readings[row, column], reading)
@@ -193,7 +193,7 @@ def test_failures_against_a_walk_through_the_episodes(who: str) -> None:
             rule = int(sim.Teacher().rule(sensors[None])[0])
             given = COMMANDS[int(kinds(command[None])[0])]
             if given != name_of(sim.Teacher()(sensors[None])[0]):
-                mistakes[sim.RULES[rule], given] += 1
+                mistakes[sim.TEACHER_RULES[rule], given] += 1
         inside = max(abs(path.x[-1]), abs(path.y[-1])) < rollout.arena.side / 2
         places[PLACES[2] if path.at_lamp[-1] else PLACES[0] if inside else PLACES[1]] += 1
     assert found.ends == {place: places[place] for place in PLACES}

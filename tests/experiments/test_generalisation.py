@@ -45,7 +45,7 @@ def lesson(readings: np.ndarray) -> Lesson:
     return Lesson(readings, sim.Teacher()(readings), rows // 20)
 
 
-READINGS = np.random.default_rng(5).uniform([0, 0, 0], [s[2] for s in sim.SENSORS], (120, 3))
+READINGS = np.random.default_rng(5).uniform([0, 0, 0], [sensor.high for sensor in sim.SENSORS], (120, 3))
 
 
 def test_unseen_samples_are_those_whose_bins_no_demonstration_met() -> None:

@@ -117,7 +117,7 @@ def test_fit_times_alternate_fold_by_fold(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_the_smooth_teachers_have_no_steps_and_stay_within_what_wheels_can_do() -> None:
     rng = np.random.default_rng(0)
-    sensors = rng.uniform([0, 0, 0], [s[2] for s in sim.SENSORS], (2000, 3))
+    sensors = rng.uniform([0, 0, 0], [sensor.high for sensor in sim.SENSORS], (2000, 3))
     nudge = rng.uniform(-1e-6, 1e-6, sensors.shape)
     commands = smooth.corral_commands(sensors)
     assert np.abs(smooth.corral_commands(sensors + nudge) - commands).max() < 1e-4

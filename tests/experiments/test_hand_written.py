@@ -10,7 +10,7 @@ import sim
 import torchvsa
 from behaviours import Behaviour, Controller
 from experiments import hand_written
-from sim.teacher import COMMANDS
+from sim.teacher import TEACHER_COMMANDS
 
 READINGS = np.array(list(product([0.5, 5.0], [0.5, 5.0], [0.1, 0.9])))
 KINDS = [(name, None) for name in torchvsa.ARCHITECTURES] + [(f"MAP-{variant}", "int8") for variant in "BCI"]
@@ -69,13 +69,13 @@ def test_the_weights_found_by_hand_suit_sums(variant: str) -> None:
 def test_one_hypervector_of_five_rules() -> None:
     behaviour = hand_written.behaviour(torchvsa.MAP(1000, dtype=torch.int8), 0)
     assert behaviour.program.shape == (1000,)
-    assert behaviour.report.pairs == len(hand_written.RULES) == len(sim.RULES)
+    assert behaviour.report.pairs == len(hand_written.RULES) == len(sim.TEACHER_RULES)
 
 
 def rules(behaviour: Behaviour) -> torch.Tensor:
     """The five pairs of condition and result `[5, d]`."""
     space = behaviour.space
-    items = space.items(space.schema.command_levels(COMMANDS))
+    items = space.items(space.schema.command_levels(TEACHER_COMMANDS))
     return space.vsa.bind(items, space.encode(torch.tensor(hand_written.RULES)))
 
 

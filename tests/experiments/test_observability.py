@@ -26,7 +26,7 @@ SMALL = (
 
 
 def test_an_undisturbed_teacher_drives_as_the_teacher() -> None:
-    def drive(policy: sim.Policy) -> sim.Rollout:
+    def drive(policy: sim.ControllerLike) -> sim.Rollout:
         return sim.rollout(policy, episodes=range(3), seconds=5, robots=2)
 
     undisturbed: Disturbance = DISTURBANCES["delayed"](0, 0)

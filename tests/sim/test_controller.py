@@ -77,7 +77,7 @@ def controllers() -> list[Any]:
 
 
 @pytest.mark.parametrize("policy", controllers(), ids=lambda one: getattr(one, "build", type(one).__name__))
-def test_a_batch_is_stacked_singles_in_any_order(policy: sim.Policy) -> None:
+def test_a_batch_is_stacked_singles_in_any_order(policy: sim.ControllerLike) -> None:
     # The teacher's episodes end at different steps, so that slots are refilled while others go on.
     run: dict[str, Any] = {"seed": 4, "seconds": 9.0, "dwell": 0.5}
     before = pickle.dumps(policy)
@@ -149,14 +149,14 @@ def ones(state: Integers) -> Floats:
         (Answering(lambda state: ones(state) * np.nan), "the policy commanded"),
         (Answering(lambda state: "left"), "commands are of type"),
         (Answering(ones, lambda state: state[1:]), r"shape \(2, 2\); expected one row per robot, 3 in all"),
-        (Answering(ones, lambda state: None), "its structure, types and shapes must stay"),
-        (Answering(ones, lambda state: (state,)), "its structure, types and shapes must stay"),
+        (Answering(ones, lambda state: None), "its structure, types and shapes must not change"),
+        (Answering(ones, lambda state: (state,)), "its structure, types and shapes must not change"),
         (Answering(ones, lambda state: state * 1.0), "float64.*earlier it held.*int64"),
-        (Answering(ones, lambda state: torch.from_numpy(state)), "its structure, types and shapes must stay"),
+        (Answering(ones, lambda state: torch.from_numpy(state)), "its structure, types and shapes must not change"),
         (Answering(ones, lambda state: "state"), "the state holds 'state'; expected arrays or tensors"),
     ],
 )
-def test_wrong_answers_and_states_name_episode_and_step(wrong: sim.Policy, words: str) -> None:
+def test_wrong_answers_and_states_name_episode_and_step(wrong: sim.ControllerLike, words: str) -> None:
     with pytest.raises(ValueError, match=f"episode 4, step 3: .*{words}"):
         sim.rollout(wrong, episodes=[4, 5, 6])
 
@@ -227,7 +227,7 @@ def test_what_cannot_drive_is_named(policy: Any) -> None:
 
 
 @pytest.mark.parametrize("policy", controllers(), ids=lambda one: getattr(one, "build", type(one).__name__))
-def test_a_replay_gives_the_commands_of_the_rollout(policy: sim.Policy) -> None:
+def test_a_replay_gives_the_commands_of_the_rollout(policy: sim.ControllerLike) -> None:
     run = sim.rollout(policy, episodes=[3, 1, 8, 2], seed=4, seconds=9.0, dwell=0.5)
     path, episodes = run.trajectory, run.step_episode
     np.testing.assert_array_equal(sim.replay(policy, path.sensors, episodes), path.commands)

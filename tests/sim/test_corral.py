@@ -6,7 +6,7 @@ import pytest
 
 import sim
 from sim.corral import draw_episode, find_arena
-from sim.fleet import Fleet
+from sim.vector_sim import VectorSim
 
 
 @pytest.mark.parametrize(
@@ -34,7 +34,7 @@ def test_an_arena_that_cannot_be_built_names_its_field(change: dict[str, float],
 )
 def test_an_arena_that_does_not_fit_the_robot_is_refused(change: dict[str, float], field: str) -> None:
     with pytest.raises(ValueError, match=field):
-        Fleet(1, sim.Arena(**change))
+        VectorSim(1, sim.Arena(**change))
 
 
 def test_walls_enclose_the_corral_but_for_the_gap() -> None:

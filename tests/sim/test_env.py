@@ -22,9 +22,9 @@ def test_spaces_are_those_of_the_tables() -> None:
     env = gymnasium.make("CorralEscape-v0")
     assert env.observation_space == gymnasium.spaces.Box(np.zeros(3), np.array([5.0, 5.0, 0.6]), dtype=np.float64)
     assert env.action_space == gymnasium.spaces.Box(-1.0, 1.0, (2,), np.float64)
-    for bound, column in ((env.observation_space, sim.SENSORS), (env.action_space, sim.ACTUATORS)):
+    for bound, channels in ((env.observation_space, sim.SENSORS), (env.action_space, sim.ACTUATORS)):
         assert isinstance(bound, gymnasium.spaces.Box)
-        assert bound.high.tolist() == [row[2] for row in column]
+        assert bound.high.tolist() == [channel.high for channel in channels]
     assert env.spec is not None
     assert env.spec.max_episode_steps == MAX_STEPS == 1200
     env.close()
@@ -139,7 +139,7 @@ def test_vector_pictures_are_one_each() -> None:
 
 def test_closing_twice_is_fine() -> None:
     env = sim.CorralEscapeEnv()
-    client = env._cells.fleet.worlds[0].client
+    client = env._state.simulator.worlds[0].client
     assert pybullet.getConnectionInfo(client)["isConnected"]
     env.close()
     env.close()

@@ -11,7 +11,7 @@ import pytest
 from clients import connected
 
 import sim
-from sim.fleet import Fleet, World
+from sim.vector_sim import VectorSim, World
 
 
 def test_dropped_environments_free_their_clients() -> None:
@@ -33,9 +33,9 @@ def test_dropped_environments_free_their_clients() -> None:
 
 def test_a_dropped_fleet_frees_only_its_own_clients() -> None:
     with World(sim.Arena(), "planar") as kept:
-        fleet: Fleet | None = Fleet(2)
-        clients = [world.client for world in fleet.worlds] if fleet else []
-        fleet = None
+        simulator: VectorSim | None = VectorSim(2)
+        clients = [world.client for world in simulator.worlds] if simulator else []
+        simulator = None
         gc.collect()
         assert not any(pybullet.getConnectionInfo(client)["isConnected"] for client in clients)
         assert pybullet.getConnectionInfo(kept.client)["isConnected"]
@@ -47,8 +47,8 @@ def test_a_constructor_that_fails_leaves_no_client(fails: str, monkeypatch: pyte
         raise RuntimeError("broken")
 
     before = connected()
-    monkeypatch.setattr(f"sim.fleet.{fails}", broken)
-    for make in (sim.CorralEscapeEnv, lambda: sim.CorralEscapeVectorEnv(3), lambda: Fleet(2)):
+    monkeypatch.setattr(f"sim.vector_sim.{fails}", broken)
+    for make in (sim.CorralEscapeEnv, lambda: sim.CorralEscapeVectorEnv(3), lambda: VectorSim(2)):
         with pytest.raises(RuntimeError, match="broken"):
             make()
         assert connected() == before
@@ -59,7 +59,7 @@ def test_a_rollout_that_fails_while_it_starts_leaves_no_client(monkeypatch: pyte
         raise MemoryError
 
     before = connected()
-    monkeypatch.setattr("sim.fleet.draw_episode", broken)
+    monkeypatch.setattr("sim.vector_sim.draw_episode", broken)
     with pytest.raises(MemoryError):
         sim.rollout(sim.Teacher(), episodes=[0, 1])
     assert connected() == before

@@ -82,7 +82,7 @@ def test_a_long_episode_is_drawn_in_larger_steps(pair: tuple[Rollout, Rollout], 
 
 def test_misuse_is_named_and_leaves_no_file(pair: tuple[Rollout, Rollout], tmp_path: Path) -> None:
     path = tmp_path / "c.gif"
-    with pytest.raises(ValueError, match="one title a rollout"):
+    with pytest.raises(ValueError, match="one title per rollout"):
         render.animate(pair, ["teacher"], path)
     with pytest.raises(ValueError, match="different arenas"):
         render.animate([pair[0], dataclasses.replace(pair[1], arena=sim.ARENAS["large"])], ["a", "b"], path)

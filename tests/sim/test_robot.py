@@ -6,8 +6,8 @@ import pytest
 
 import sim
 from sim.corral import Start
-from sim.fleet import TOUCH, Fleet, World
 from sim.robot import CONTROL_HZ, HEIGHT, MAX_SPEED, RADIUS, TRACK, find_body
+from sim.vector_sim import TOUCH, VectorSim, World
 
 ARENA = sim.Arena(side=3.0, gap=1.0, lamp_beyond=0.8)
 BODIES = ["planar", "wheeled"]
@@ -76,13 +76,13 @@ def test_the_planar_body_never_leaves_its_plane() -> None:
 
 
 def test_a_minute_against_the_lamp_does_not_lift_the_planar_body() -> None:
-    with Fleet(1, ARENA, "planar") as fleet:
-        fleet.reset(0, 0)
-        fleet._poses[0] = fleet.worlds[0].body.place(Start(1.9, 0.02, 0.0))
+    with VectorSim(1, ARENA, "planar") as simulator:
+        simulator.reset(0, 0)
+        simulator._poses[0] = simulator.worlds[0].body.place(Start(1.9, 0.02, 0.0))
         teacher = sim.Teacher()
         for _ in range(60 * CONTROL_HZ):
-            fleet.drive([0], teacher(fleet.observe([0]).sensors))
-        assert height(fleet.worlds[0]) == pytest.approx(HEIGHT, abs=1e-5)
+            simulator.drive([0], teacher(simulator.observe([0]).sensors))
+        assert height(simulator.worlds[0]) == pytest.approx(HEIGHT, abs=1e-5)
 
 
 def test_the_wheeled_body_stays_on_the_floor() -> None:
@@ -95,14 +95,14 @@ def test_the_wheeled_body_stays_on_the_floor() -> None:
 
 @pytest.mark.parametrize("body", BODIES)
 def test_a_robot_that_faces_the_lamp_comes_to_rest_against_it_and_stays(body: str) -> None:
-    with Fleet(1, ARENA, body) as fleet:
-        fleet.reset(0, 0)
-        fleet._poses[0] = fleet.worlds[0].body.place(Start(1.0, 0.1, 0.0))
+    with VectorSim(1, ARENA, body) as simulator:
+        simulator.reset(0, 0)
+        simulator._poses[0] = simulator.worlds[0].body.place(Start(1.0, 0.1, 0.0))
         teacher, touching = sim.Teacher(), []
-        state = fleet.observe([0])
+        state = simulator.observe([0])
         for _ in range(20 * CONTROL_HZ):
-            fleet.drive([0], teacher(state.sensors))
-            state = fleet.observe([0])
+            simulator.drive([0], teacher(state.sensors))
+            state = simulator.observe([0])
             touching.append(bool(state.at_lamp[0]))
         assert math.hypot(state.x[0] - 2.3, state.y[0]) == pytest.approx(RADIUS + ARENA.lamp_radius, abs=TOUCH)
     first = touching.index(True)

@@ -11,9 +11,9 @@ import pytest
 
 import sim
 from sim.corral import draw_start
-from sim.fleet import TOUCH
 from sim.result import Rollout, Steps
 from sim.robot import CONTROL_HZ, RADIUS
+from sim.vector_sim import TOUCH
 
 
 def equal(a: Rollout, b: Rollout) -> bool:
@@ -32,7 +32,7 @@ def teacher() -> Rollout:
 @pytest.mark.slow
 @pytest.mark.parametrize("body", ["planar", "wheeled"])
 @pytest.mark.parametrize("policy", [sim.Teacher(), policies.random])
-def test_batch_size_and_order_change_no_bit(body: str, policy: sim.Policy) -> None:
+def test_batch_size_and_order_change_no_bit(body: str, policy: sim.ControllerLike) -> None:
     run: dict[str, Any] = {"body": body, "seed": 4, "seconds": 12.0}
     alone = sim.rollout(policy, episodes=range(5), robots=1, **run)
     assert equal(alone, sim.rollout(policy, episodes=range(5), robots=1, **run))
@@ -233,7 +233,7 @@ def test_a_policy_that_breaks_leaves_no_client() -> None:
         ({"body": "flying"}, "unknown body 'flying'"),
         ({"episodes": []}, "expected at least one whole number"),
         ({"episodes": [0.5]}, "episode 0.5; expected a whole number"),
-        ({"episodes": [3, 1, 3]}, "episode 3 is asked for 2 times"),
+        ({"episodes": [3, 1, 3]}, "episode 3 is given 2 times"),
         ({"episodes": [-2]}, "episode -2"),
         ({"seed": -1}, "seed -1"),
         ({"seconds": 0.0}, "0.0 s; expected"),
@@ -266,7 +266,7 @@ def test_the_teachers_episodes_show_all_of_its_rules_and_few_bins_contradict() -
     rows = run.trajectory.rows(~run.trajectory.reached)
     shares = np.bincount(sim.Teacher().rule(rows.sensors), minlength=5) / len(rows)
     assert shares.min() > 0.01
-    high = np.array([row[2] for row in sim.SENSORS])
+    high = np.array([sensor.high for sensor in sim.SENSORS])
     for bins in (16, 32):
         cells = np.minimum((rows.sensors / high * bins).astype(int), bins - 1) @ [bins * bins, bins, 1]
         table: dict[int, dict[tuple[float, ...], int]] = {}

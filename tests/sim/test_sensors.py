@@ -6,10 +6,10 @@ import pytest
 
 import sim
 from sim.corral import ROBOT_GROUP, WALL_GROUP, Start
-from sim.fleet import World
 from sim.robot import RADIUS
 from sim.sensors import DISTANCE_MAX, LIGHT_INWARD, LIGHT_MAX, LIGHT_MOUNT, LIGHT_OUTWARD, LIGHT_REACH, SensorArray
 from sim.sensors import SENSOR_HEIGHT as Z
+from sim.vector_sim import World
 
 ARENA = sim.Arena(side=3.0, gap=1.0, lamp_beyond=0.8)
 LAMP = (2.3, 0.0)
@@ -121,7 +121,7 @@ def test_beams_pass_above_the_lamp_and_below_the_top_of_the_walls() -> None:
 
 def test_readings_stay_in_their_declared_range() -> None:
     generator = np.random.default_rng(0)
-    low, high = (np.array([row[i] for row in sim.SENSORS]) for i in (1, 2))
+    low, high = np.array([(sensor.low, sensor.high) for sensor in sim.SENSORS]).T
     with World(ARENA, "planar") as world:
         array = SensorArray(ARENA)
         x, y, heading = generator.uniform(-1, 1, (3, 3000)) * [[2.5], [1.6], [math.pi]]

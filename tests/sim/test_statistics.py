@@ -36,5 +36,5 @@ def test_the_median_counts_what_came_too_late() -> None:
 
 @pytest.mark.parametrize("times", [[], [1.0, math.nan]])
 def test_the_median_refuses_nothing_and_nan(times: list[float]) -> None:
-    with pytest.raises(ValueError, match="expected one number an episode"):
+    with pytest.raises(ValueError, match="expected one number per episode"):
         censored_median(times)

@@ -27,15 +27,15 @@ def test_truth_table() -> None:
     commands = sim.Teacher()(sensors)
     rules = sim.Teacher().rule(sensors)
     assert commands.dtype == np.float64
-    assert [(sim.RULES[rule], command.tolist()) for rule, command in zip(rules, commands, strict=True)] == [
+    assert [(sim.TEACHER_RULES[rule], command.tolist()) for rule, command in zip(rules, commands, strict=True)] == [
         TRUTH[case] for case in cases
     ]
 
 
 def test_thresholds_are_strict() -> None:
     teacher = sim.Teacher()
-    assert teacher.rule(np.array([[LIGHT_MAX, LIGHT_MAX, OBSTACLE]])) == sim.RULES.index("cruise")
-    assert teacher.rule(np.array([[LIGHT_MAX, LIGHT_MAX, np.nextafter(OBSTACLE, 0)]])) == sim.RULES.index(
+    assert teacher.rule(np.array([[LIGHT_MAX, LIGHT_MAX, OBSTACLE]])) == sim.TEACHER_RULES.index("cruise")
+    assert teacher.rule(np.array([[LIGHT_MAX, LIGHT_MAX, np.nextafter(OBSTACLE, 0)]])) == sim.TEACHER_RULES.index(
         "avoid_obstacle"
     )
     assert teacher.rule(np.array([[np.nextafter(LIGHT_MAX, 0), LIGHT_MAX, 0.0]])) == 1
@@ -48,7 +48,7 @@ def test_the_obstacle_threshold_is_not_handed_to_equal_bins(bins: int) -> None:
 
 
 def test_behaviours_partition_the_rules() -> None:
-    assert sorted(rule for rules in sim.BEHAVIOURS.values() for rule in rules) == list(range(len(sim.RULES)))
+    assert sorted(rule for rules in sim.BEHAVIOURS.values() for rule in rules) == list(range(len(sim.TEACHER_RULES)))
 
 
 def test_the_answer_may_be_changed_without_changing_the_teacher() -> None:

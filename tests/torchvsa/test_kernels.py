@@ -124,7 +124,7 @@ def test_products_are_mapped_and_differentiated() -> None:
 def test_integer_products_are_exact_with_and_without_integer_units(
     rows: int, items: int, dim: int, units: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("torchvsa._kernels.integer_products._UNITS", units)
+    monkeypatch.setattr("torchvsa._kernels.integer_products._HAS_UNITS", units)
     generator = torch.Generator().manual_seed(rows)
     a, b = (torch.randint(-128, 128, (count, dim), generator=generator, dtype=torch.int8) for count in (rows, items))
     assert (integer_products(a, b).numpy() == a.numpy().astype(np.int64) @ b.numpy().astype(np.int64).T).all()
@@ -133,7 +133,7 @@ def test_integer_products_are_exact_with_and_without_integer_units(
 
 @pytest.mark.parametrize("units", [True, False])
 def test_the_largest_integer_products_are_exact(units: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("torchvsa._kernels.integer_products._UNITS", units)
+    monkeypatch.setattr("torchvsa._kernels.integer_products._HAS_UNITS", units)
     for dim in (131_040, 131_041, 200_001):
         x = torch.full((2, dim), -128, dtype=torch.int8)
         assert (integer_products(x, x) == dim * 2**14).all()

@@ -1,5 +1,6 @@
 """The law suites that users run: they pass on sound parts, and name the law that a broken one breaks."""
 
+import math
 from typing import Any
 
 import pytest
@@ -125,3 +126,46 @@ def test_a_checked_part_stays_as_it_was() -> None:
         check_encoder(encode)
     assert not plan.drawn
     assert all(torch.equal(tensor, before[name]) for name, tensor in drawn.state_dict().items())
+
+
+class Square(MAP):
+    """Takes square numbers of dimensions only."""
+
+    def __init__(self, dim: int) -> None:
+        super().__init__(dim)
+        self.name = "square"
+
+    def allows_dim(self, dim: int) -> bool:
+        return math.isqrt(dim) ** 2 == dim
+
+
+def test_a_dim_that_is_not_allowed_is_refused_with_the_nearest() -> None:
+    check_architecture(Square(529))
+    with pytest.raises(ValueError, match="Square does not allow dim=4000; the nearest allowed: 3969 and 4096"):
+        Square(4000)
+    with pytest.raises(ValueError, match="Square does not allow dim=2; the nearest allowed: 1 and 4"):
+        Square(2)
+
+
+class Careless(Square):
+    """Does not ask its own rule."""
+
+    def allows_dim(self, dim: int) -> bool:
+        return dim < 0 or not hasattr(self, "variant") or super().allows_dim(dim)
+
+
+class Unfinished(HRR):
+    """Overrides neither `_bind` nor `bind`."""
+
+    _bind = torchvsa.VSA._bind
+
+
+def test_a_law_asks_whether_its_own_dim_is_allowed() -> None:
+    with pytest.raises(AssertionError, match="breaks the law: a dim that is not allowed is refused"):
+        check_architecture(Careless(500))
+
+
+def test_an_architecture_without_binding_says_what_is_missing() -> None:
+    x = torch.ones(8)
+    with pytest.raises(NotImplementedError, match="Unfinished must implement _bind"):
+        Unfinished(8).bind(x, x)

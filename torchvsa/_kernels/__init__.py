@@ -1,1 +1,1 @@
-"""Fast paths, each beside the plain line that it equals and with the command that measured it."""
+"""Fast paths. Each states the plain line that it equals and the command that measured it."""

@@ -26,7 +26,7 @@ ARCHITECTURES: Registry[Callable[..., VSA]] = Registry(
 
 
 def architecture(name: str, dim: int, dtype: str | torch.dtype | None = None, **options: str) -> VSA:
-    """Make an architecture by its name in `ARCHITECTURES`; without a `dtype`, of its default type."""
+    """Make an architecture by its name in `ARCHITECTURES`. Its own default applies without a `dtype`."""
     make = ARCHITECTURES.find(name)
     if isinstance(dtype, str):
         found = getattr(torch, dtype, None)

@@ -1,4 +1,4 @@
-"""Random bits, from which bipolar and binary hypervectors are made."""
+"""Random bits for bipolar and binary hypervectors."""
 
 import torch
 from jaxtyping import UInt8
@@ -8,10 +8,10 @@ from torch import Tensor
 def random_bits(
     *shape: int, generator: torch.Generator | None, device: torch.device | str | None
 ) -> UInt8[Tensor, "*shape"]:
-    """Fair, independent bits 0 / 1.
+    """Independent bits 0 / 1 of equal probability.
 
-    Whole random bytes are drawn and unpacked: an eighth of the draws, and each row of the last dimension
-    starts at a byte, so that drawing n rows at once or one by one gives the same bits.
+    Unpacks random bytes, which takes an eighth of the draws. Each row of the last dimension starts at a byte, so that
+    drawing n rows at once or one by one gives the same bits.
     """
     source = generator.device if generator is not None else device
     *rows, count = shape

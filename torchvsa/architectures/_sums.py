@@ -1,4 +1,4 @@
-"""Sums and products of integer hypervectors and raw accumulators, exact or refused."""
+"""Sums and products of integer hypervectors and raw accumulators, exact or refused with an error."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -13,14 +13,14 @@ from torchvsa.errors import ShapeError
 
 
 def stacked(xs: Any, dim: Any) -> tuple[Shaped[Tensor, "..."], int]:
-    """Summands as one tensor, a list or tuple of them stacked on dimension -2, and the dimension to sum over."""
+    """The summands as one tensor (a list or tuple is stacked on dimension -2), and the dimension to sum over."""
     if isinstance(dim, Tensor):
         raise ValueError("dim is the number of a dimension, but a tensor was given; to bundle a and b write [a, b]")
     if isinstance(xs, list | tuple):
         if not xs or not all(isinstance(x, Tensor) for x in xs):
             raise ValueError("a list of hypervectors to bundle must hold at least one tensor, and nothing else")
         if len({x.dtype for x in xs}) > 1:
-            xs = [as_bipolar(x) for x in xs]  # bits beside accumulators of votes are votes
+            xs = [as_bipolar(x) for x in xs]  # together with accumulators of votes, bits count as votes
         try:
             xs = torch.stack(torch.broadcast_tensors(*xs), -2)
         except RuntimeError:
@@ -32,7 +32,7 @@ def stacked(xs: Any, dim: Any) -> tuple[Shaped[Tensor, "..."], int]:
 
 
 def check_weights(weights: Tensor, votes: Tensor, count: int) -> None:
-    """Raise unless there is one weight of a suitable type for each of `count` summands."""
+    """Raise an error unless there is one weight of a suitable type per summand."""
     if weights.dim() == 0 or weights.shape[-1] != count:
         raise ShapeError(f"weights must hold one number for each of {count} summands; got shape {tuple(weights.shape)}")
     real = weights.is_floating_point() or weights.dtype == torch.bool or weights.dtype in INTEGERS
@@ -41,7 +41,7 @@ def check_weights(weights: Tensor, votes: Tensor, count: int) -> None:
 
 
 def weighted(votes: Shaped[Tensor, "..."], dim: int, weights: Tensor) -> Shaped[Tensor, "..."]:
-    """The sum over `dim` of floats or complex numbers (or integers with float weights), each times its weight."""
+    """The weighted sum over `dim` of floats or complex numbers, or of integers with float weights."""
     if is_integer(votes):
         # Half precision has too few digits for sums.
         votes = votes.to(torch.promote_types(weights.dtype, torch.float32))
@@ -52,9 +52,9 @@ def weighted(votes: Shaped[Tensor, "..."], dim: int, weights: Tensor) -> Shaped[
 
 
 def integer_sum(votes: Shaped[Tensor, "..."], dim: int, weights: Tensor | None) -> Shaped[Tensor, "..."]:
-    """The sum over `dim` in int32, exact; raises `ValueError` if it does not fit, where values can be looked at.
+    """The exact sum over `dim` in int32. Raises `ValueError` if it does not fit, where values are readable.
 
-    Types and the number of summands mostly prove that it fits: values are looked at only where they do not.
+    The types and the number of summands mostly prove that it fits; only otherwise are values read.
     """
     wide = torch.int32
     scale = 1 if weights is None else type_bound(weights.dtype)
@@ -76,9 +76,9 @@ def _given(weights: Tensor | None) -> Sequence[Tensor]:
 
 
 def multiplied(a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-    """`a * b`; two raw accumulators of integers are looked at, where values can be, and refused if it does not fit.
+    """`a * b`. Raises `ValueError` if a product of two integer accumulators does not fit, where values are readable.
 
-    The type of codes, int8, needs no look: a product with -1, 0 or +1 always fits.
+    Hypervectors in int8 need no check: a product with -1, 0 or +1 always fits.
     """
     narrow = a.dtype.itemsize == 1 or b.dtype.itemsize == 1
     if narrow or not (is_integer(a) and is_integer(b) and readable(a, b)):

@@ -1,19 +1,16 @@
-"""What every Vector Symbolic Architecture shares."""
+"""The interface of Vector Symbolic Architectures, and what all of them share."""
 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import reduce
 from typing import ClassVar
 
 import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
-from torchvsa._blocks import by_blocks
-from torchvsa._checks import INTEGERS, whole_number
-from torchvsa._kernels.look_up import entries
-from torchvsa._kernels.rotation import roll_rows
+from torchvsa._checks import INTEGERS, nearest, whole_number
+from torchvsa._kernels.rotation import rotate
 from torchvsa._memory_limit import require_memory
 from torchvsa._numerics import as_bipolar, cosines, is_integer, norms
 from torchvsa.architectures._sums import check_weights, integer_sum, stacked, weighted
@@ -29,33 +26,43 @@ class VSA(ABC):
     """A space of hypervectors of `dim` numbers, and the operations on them.
 
     Hypervectors are plain tensors `[..., d]`; leading dimensions are batches. A **raw accumulator** is what
-    `superpose` returns: a sum that has not been normalised yet. `bind`, `unbind`, `permute` and `similarity`
+    `superpose` returns: a sum that is not normalised yet. `bind`, `unbind`, `permute` and `similarity`
     accept it in place of a hypervector, which keeps them linear; `normalize` turns it into a hypervector.
 
-    A new architecture implements `random`, `identity`, `bind`, `unbind` and `normalize`, names itself, and is
-    listed in `torchvsa.architectures.ARCHITECTURES`.
+    A new architecture implements `random`, `identity`, `_bind`, `_unbind` (not needed if `_bind` undoes itself) and
+    `normalize`. It sets `name` and every attribute below that differs, overrides `allows_dim` if not every `dim` works,
+    and is registered in `torchvsa.ARCHITECTURES`. `bind` and `unbind` check shapes and then call `_bind` and `_unbind`;
+    an architecture that needs other checks overrides the public methods instead.
     """
 
     name: str
     elementwise: ClassVar[bool] = True
-    """Whether `bind` acts on every dimension by itself."""
+    """Whether element i of `bind(a, b)` depends on the elements i of `a` and `b` only."""
     commutative: ClassVar[bool] = True
     """Whether `bind(a, b)` equals `bind(b, a)`."""
     bilinear: ClassVar[bool] = True
-    """Whether `bind` and `unbind` are linear in the key as well, so that programs can be folded into items."""
+    """Whether `bind` and `unbind` are linear in the key too, so that `readout` can fold programs into items."""
     self_inverse: bool = False
-    """Whether `bind` with the same key undoes itself."""
+    """Whether binding twice with the same key gives back the hypervector."""
     negatable: ClassVar[bool] = True
     """Whether hypervectors have a `negative`."""
     sparse: ClassVar[bool] = False
-    """Whether few elements of a hypervector differ from 0."""
+    """Whether most elements of a hypervector are 0."""
     breaks_ties: bool = False
-    """Whether `bundle` needs the voters themselves, to decide split votes, and not just their sum."""
+    """Whether `bundle` needs the summands themselves to decide ties, not only their sum."""
+    clips: bool = False
+    """Whether `normalize` clips to [-1, 1], and nothing else."""
+    in_place: ClassVar[str | None] = None
+    """The name of PyTorch's method that writes `bind(a, b)` of two hypervectors into `a`, if there is one."""
 
     def __init__(self, dim: int, dtype: torch.dtype) -> None:
         self.dim = whole_number(dim, _DIM)
         if self.dim < 1:
             raise ValueError(f"{_DIM}; got {dim!r}")
+        if not self.allows_dim(self.dim):
+            raise ValueError(
+                f"{type(self).__name__} does not allow dim={self.dim}; {nearest(self.allows_dim, self.dim)}"
+            )
         self.dtype = dtype
 
     def __repr__(self) -> str:
@@ -70,6 +77,13 @@ class VSA(ABC):
     def config(self) -> dict[str, str | int]:
         """Name, dim and dtype, from which `torchvsa.architecture(**config)` makes an equal object."""
         return {"name": self.name, "dim": self.dim, "dtype": str(self.dtype).removeprefix("torch.")}
+
+    def allows_dim(self, dim: int) -> bool:
+        """Whether hypervectors can have `dim` elements (for example only a square number). Any number by default.
+
+        The constructor of `VSA` calls it: an override may read attributes that are set before `super().__init__()`.
+        """
+        return True
 
     @property
     def integer(self) -> bool:
@@ -86,44 +100,54 @@ class VSA(ABC):
         """Bytes of one hypervector."""
         return self.dim * self.dtype.itemsize
 
-    # -- what an architecture defines ------------------------------------------------------------------
-
     @abstractmethod
     def random(
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
         """Independent random hypervectors `[*shape, d]`.
 
-        They are drawn on the generator's device (the same seed gives the same bits wherever they go) and
-        moved to `device`. Without a generator PyTorch's global one is used.
+        They are drawn on the generator's device and then moved to `device`: a seed gives the same bits on every
+        device. Without a generator, PyTorch's global one is used.
         """
 
     @abstractmethod
     def identity(self) -> Shaped[Tensor, "d"]:
-        """The hypervector that leaves others as they are when bound."""
+        """The hypervector `e` with `bind(a, e) = a`."""
 
-    @abstractmethod
     def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """Join two hypervectors into one that is dissimilar to both; `b` is the key.
+        """Combine two hypervectors into one that is dissimilar to both; `b` is the key.
 
-        Linear in `a`, so that it distributes over raw accumulators. Whether it is in `b` too, and whether it commutes,
-        the architecture says (`bilinear`, `commutative`).
+        Linear in `a`, so that it distributes over raw accumulators. The attributes `bilinear` and `commutative` say
+        whether it is linear in `b` too, and whether it commutes.
+
+        Raises:
+            ShapeError: `a` or `b` does not end in `d` elements.
+            ValueError: A product of two raw accumulators of integers does not fit their type (see `superpose`).
         """
+        self.check(a, "a")
+        self.check(b, "b")
+        return self._bind(a, b)
 
-    @abstractmethod
     def unbind(
         self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
-        """Undo `bind`: `unbind(bind(a, key), key)` is (or resembles) `a`. Linear in `bound`."""
+        """Undo `bind`: `unbind(bind(a, key), key)` equals or resembles `a`. Linear in `bound`; raises like `bind`."""
+        self.check(bound, "bound")
+        self.check(key, "key")
+        return self._unbind(bound, key)
+
+    def _bind(self, a: Tensor, b: Tensor) -> Tensor:
+        raise NotImplementedError(f"{type(self).__name__} must implement _bind (or override bind and unbind)")
+
+    def _unbind(self, bound: Tensor, key: Tensor) -> Tensor:
+        return self._bind(bound, key)
 
     @abstractmethod
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Turn a raw accumulator into a hypervector of this architecture."""
 
-    # -- what follows from it --------------------------------------------------------------------------
-
     def negative(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """The hypervector that is as unlike `x` as can be: similarity -1."""
+        """The hypervector whose similarity to `x` is -1. Raises `ValueError` unless the architecture is `negatable`."""
         if not self.negatable:
             raise ValueError(f"{self.name} has no negative hypervectors")
         self.check(x, "x")
@@ -131,11 +155,11 @@ class VSA(ABC):
 
     @property
     def frequencies(self) -> int | None:
-        """How many angles `from_angles` takes; None for an architecture without a spectrum."""
+        """The number of angles that `from_angles` takes; None for an architecture without a spectrum."""
         return None
 
     def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
-        """The hypervector whose spectrum has these angles, and magnitude 1: what `FractionalPower` is made of."""
+        """The hypervector whose spectrum has these angles and magnitude 1, as `FractionalPower` needs it."""
         raise ValueError(f"{self.name} has no spectrum; fractional powers need FHRR or HRR")
 
     def permute(
@@ -143,9 +167,13 @@ class VSA(ABC):
     ) -> Shaped[Tensor, "*#batch d"]:
         """Rotate the elements to the right: element `i` moves to `(i + shift) mod d`.
 
-        `shifts` is one number, or a tensor with one for each hypervector (any shape that broadcasts with the
-        batch). Negative shifts rotate to the left. Raises `ValueError` unless shifts are whole numbers, of a signed
-        integer type or uint8.
+        Args:
+            x: Hypervectors `[..., d]`.
+            shifts: One number, or a tensor with one per hypervector (any shape that broadcasts with the batch).
+                Negative shifts rotate to the left.
+
+        Raises:
+            ValueError: Shifts are not whole numbers, of a signed integer type or uint8.
         """
         self.check(x, "x")
         if not isinstance(shifts, Tensor):
@@ -153,20 +181,7 @@ class VSA(ABC):
             return torch.roll(x, shift % self.dim, -1)
         if shifts.dtype not in INTEGERS:
             raise ValueError(f"shifts are a whole number or a tensor of integers; got a tensor of {shifts.dtype}")
-        return self._permuted(x, shifts)
-
-    def _permuted(self, x: Shaped[Tensor, "*#batch d"], shifts: Int[Tensor, "*#batch"]) -> Shaped[Tensor, "*#batch d"]:
-        """`permute` with a tensor of shifts."""
-        if shifts.shape != x.shape[:-1]:
-            batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
-            x, shifts = x.expand(*batch, self.dim), shifts.expand(batch)
-        # Small types cannot hold every shift up to d, nor any type the negative of its lowest number.
-        starts = (-shifts.to(torch.int64).remainder(self.dim)).remainder(self.dim)
-        # Rows are written twice on the way.
-        rows = by_blocks(
-            roll_rows, x.reshape(-1, self.dim), starts.reshape(-1), row_bytes=4 * self.dim * x.element_size()
-        )
-        return rows.reshape(x.shape)
+        return rotate(x, shifts)
 
     def superpose(
         self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
@@ -176,7 +191,7 @@ class VSA(ABC):
         Args:
             xs: A tensor, `[..., k, d]` for the default `dim`, or a list or tuple of `k` tensors `[..., d]`.
             dim: The dimension to sum over.
-            weights: One number per summand: `[k]`, or `[*batch, k]` for one in each batch element too.
+            weights: One number per summand, `[k]`, or other ones for each batch element, `[*batch, k]`.
 
         Integers (bits count as votes) with integer weights give an exact sum in int32. Integers with float weights give
         a sum in the weights' type, float32 at least; other summands keep their own type.
@@ -184,15 +199,15 @@ class VSA(ABC):
         Raises:
             ShapeError: `dim` is the hypervector dimension, or the weights do not fit.
             ValueError: The sum does not fit int32, an intermediate product does not fit int64, or weights are NaN or
-                infinite. Where looking at values would stall or break something (on another device than the CPU, in
-                compiled and exported graphs, under `vmap`) only types are checked: there a sum of int8 codes fits if
-                `k` times the largest absolute weight is below 2^24, and one that does not fit wraps around.
+                infinite. Values are checked on a CPU only, outside of compiled and exported graphs and of `vmap`;
+                elsewhere a sum of int8 codes fits if `k` times the largest absolute weight is below 2^24, and a sum
+                that does not fit wraps around.
         """
         xs, dim = stacked(xs, dim)
         self.check(xs, "xs")
         if xs.dim() < 2 or dim in (-1, xs.dim() - 1):
             raise ShapeError(
-                f"bundling sums over one dimension beside the hypervectors' own; got shape {tuple(xs.shape)} and "
+                f"bundling sums over a dimension other than the last; got shape {tuple(xs.shape)} and "
                 f"dim={dim}, expected e.g. [..., k, {self.dim}] and dim=-2"
             )
         votes = as_bipolar(xs)
@@ -207,10 +222,10 @@ class VSA(ABC):
     def bundle(
         self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
     ) -> Shaped[Tensor, "..."]:
-        """Superpose `k` hypervectors into one that is similar to each of them: sum in one step, then normalise.
+        """Superpose `k` hypervectors into one that is similar to each of them: the sum, normalised.
 
-        Order-free, but not associative: bundle all at once, or keep a raw accumulator.
-        Arguments as in `superpose`.
+        Takes the arguments of `superpose`. The order of the summands does not matter, but bundling is not associative:
+        bundle all at once, or keep a raw accumulator.
         """
         return self.normalize(self.superpose(xs, dim, weights))
 
@@ -220,39 +235,17 @@ class VSA(ABC):
         """`bundle` of `a` and `b`, element by element of the (broadcast) batch."""
         return self.bundle([a, b])
 
-    def _bundle_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """`bundle` of the hypervectors `table[i, places[:, i]]`, where it needs only their sum (see `breaks_ties`)."""
-        wide = self._type_of_sums(len(table))
-
-        def bundled(rows: Tensor) -> Tensor:
-            vectors = entries(table, rows)
-            return self.normalize(reduce(Tensor.add_, vectors, next(vectors).to(wide)))
-
-        return by_blocks(bundled, places, row_bytes=self.dim * (wide.itemsize + self.dtype.itemsize))
-
-    def _type_of_sums(self, count: int) -> torch.dtype:
-        """The smallest type that holds sums of so many hypervectors, which is the fastest to add."""
-        return self.dtype if count < 128 else self.accumulator  # integer codes are -1, 0 and +1
-
-    def _bind_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """The hypervectors `table[i, places[:, i]]`, bound one after the other."""
-        return by_blocks(lambda rows: reduce(self.bind, entries(table, rows)), places, row_bytes=2 * self.row_bytes)
-
     def similarity(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Float[Tensor, "*#batch"]:
         """Cosine of `a` and `b`, broadcast over their batches; a zero vector has 0 with everything.
 
-        It does not depend on their lengths, however large or small. NaN where an element is NaN or infinite.
+        Independent of their lengths, however large or small. NaN where an element is NaN or infinite.
         """
         self.check(a, "a")
         self.check(b, "b")
         return cosines(a, b).to(torch.float32)
 
     def positive(self, x: Shaped[Tensor, "*batch d"]) -> Bool[Tensor, "*batch d"]:
-        """The elements that count as > 0, from which a self-derived shift takes its width."""
+        """Which elements are above 0 (real parts of complex ones, votes of bits); `SelfShift` needs it."""
         return (x.real if x.is_complex() else as_bipolar(x)) > 0
 
     def unbundle(
@@ -264,31 +257,31 @@ class VSA(ABC):
     def fold(
         self, program: Shaped[Tensor, "*#batch d"], item: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
-        """The vector to compare keys with: `<fold(program, item), key> = <unbind(program, key), item>`.
+        """The vector `f` with `<f, key> = <unbind(program, key), item>` for every key.
 
-        `readout` needs it where `bind` is bilinear. Where it commutes, this is `unbind(program, item)`; an architecture
-        that does not commute implements its own.
+        `readout` uses it where `bind` is bilinear. Where `bind` commutes too, it is `unbind(program, item)`; an
+        architecture that is bilinear and does not commute overrides it.
         """
         if not self.commutative:
             raise NotImplementedError(f"{self.name} is bilinear and does not commute; it must implement fold")
         return self.unbind(program, item)
 
     def readout(self, programs: Shaped[Tensor, "*b d"], items: Shaped[Tensor, "K d"]) -> Readout:
-        """Ask one program `[d]`, or a stack `[b, d]`, for items `[K, d]`: see `Readout`."""
+        """A `Readout` of one program `[d]`, or of a stack `[b, d]`, that compares with the items `[K, d]`."""
         return Readout(self, programs, items)
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
-        """`norms(unbind(program, key))` for each key, in float64, without building the vectors where that pays."""
+        """The length of `unbind(program, key)` for each key, in float64."""
         return norms(self.unbind(program, keys))
 
     def require_room(self, shape: Sequence[int], element_bytes: int, generator: torch.Generator | None = None) -> None:
-        """Raise `ValueError` unless hypervectors `[*shape, d]` fit into memory at so many bytes per element."""
+        """Raise `ValueError` unless hypervectors `[*shape, d]` of `element_bytes` per element fit into memory."""
         if not torch.compiler.is_compiling() and (generator is None or generator.device.type == "cpu"):
             count = math.prod(shape)
             require_memory(
                 count * self.dim * element_bytes,
                 f"making {count} hypervectors of d = {self.dim} elements",
-                "take fewer dimensions, or some hypervectors at a time",
+                "take fewer dimensions, or fewer hypervectors at a time",
             )
 
     def check(self, x: Tensor, argument: str) -> None:
@@ -297,11 +290,13 @@ class VSA(ABC):
             raise ShapeError(f"{argument} must end in d = {self.dim} elements; got shape {tuple(x.shape)}")
 
     def check_codes(self, x: Tensor, what: str) -> None:
-        """Raise `ValueError` unless `x` holds hypervectors as `random` draws them, or parts of them put together."""
+        """Raise `ValueError` unless the elements of `x` have the type and the range of those that `random` draws."""
         self.check(x, what)
         if x.dtype != self.dtype or not self._are_codes(x):
-            raise ValueError(f"{what} must hold codes of {self}; it holds other values, or another type ({x.dtype})")
+            raise ValueError(
+                f"{what} must hold codes of {self}; it holds other values, or is of another type ({x.dtype})"
+            )
 
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
-        """Whether the elements are such as a hypervector can have."""
+        """Whether every element has a value that an element of a hypervector can have."""
         return bool(x.isfinite().all())

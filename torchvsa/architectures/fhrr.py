@@ -11,9 +11,10 @@ from torchvsa.architectures.base import VSA
 
 
 class FHRR(VSA):
-    """Fourier HRR: elements are complex numbers of length 1, bind adds their angles.
+    """Fourier HRR: elements are complex numbers of magnitude 1, and bind adds their angles.
 
-    bundle keeps the angle of the sum; an element that sums to 0 stays 0.
+    Bind is the element-wise product, unbind the product with the conjugate: exact for keys whose elements have
+    magnitude 1. Bundle keeps the angle of the sum; an element that sums to 0 stays 0.
 
     Source: Plate 1994; Gayler 2003.
     """
@@ -28,7 +29,7 @@ class FHRR(VSA):
     def random(
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
-        """See `VSA.random`: angles uniform in [-π, π)."""
+        """Elements whose angles are uniform in [-π, π)."""
         self.require_room(shape, 2 * self.dtype.itemsize, generator)
         source = generator.device if generator is not None else device
         real = torch.float64 if self.dtype == torch.complex128 else torch.float32
@@ -36,35 +37,27 @@ class FHRR(VSA):
         return torch.polar(torch.ones_like(angles), angles).to(device if device is not None else source)
 
     def identity(self) -> Shaped[Tensor, "d"]:
-        """All ones: every angle 0."""
+        """All ones: every angle is 0."""
         self.require_room((), self.dtype.itemsize)
         return torch.ones(self.dim, dtype=self.dtype)
 
-    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """The element-wise complex product."""
-        self.check(a, "a")
-        self.check(b, "b")
+    def _bind(self, a: Tensor, b: Tensor) -> Tensor:
         return a * b
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
-    ) -> Shaped[Tensor, "*#batch d"]:
-        """The product with the conjugate: exact for keys of length-1 elements."""
-        self.check(bound, "bound")
-        self.check(key, "key")
+    def _unbind(self, bound: Tensor, key: Tensor) -> Tensor:
         return bound * key.conj()
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Scale every element to length 1; zero stays zero."""
+        """Scale every element to magnitude 1; zero stays zero."""
         return safe_divide(raw, raw.abs())
 
     @property
     def frequencies(self) -> int:
-        """See `VSA.frequencies`: one for each element."""
+        """One angle per element."""
         return self.dim
 
     def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
-        """See `VSA.from_angles`: the elements themselves."""
+        """The elements e^(i·angle)."""
         return torch.polar(torch.ones_like(angles), angles).to(self.dtype)
 
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
@@ -73,10 +66,10 @@ class FHRR(VSA):
     def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
-        """The angle of a sum of two lies midway, so x is `known` mirrored at the bundle."""
+        """Estimate `x` as `known` mirrored at the bundle: the angle of a sum of two is midway between theirs."""
         return bundled**2 * known.conj()
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
-        """The root of `|key|² · |program|²`: one product for the whole batch."""
+        """The square root of `|key|² · |program|²`: one matrix product for the batch."""
         unit = units(program)
         return safe_sqrt(keys.abs() ** 2 @ ((program.abs() / unit) ** 2)) * unit.to(torch.float64)

@@ -11,7 +11,8 @@ from torchvsa.architectures.base import VSA
 class HRR(VSA):
     """Holographic Reduced Representations: bind is circular convolution, bundle the sum scaled to length 1.
 
-    Atoms are normal with variance 1/d. Unbinding is circular correlation: an approximate inverse.
+    Elements are drawn from a normal distribution of variance 1/d. Unbind is circular correlation, an approximate
+    inverse. Both take the Fourier transform.
 
     Source: Plate 1995, "Holographic reduced representations".
     """
@@ -27,52 +28,44 @@ class HRR(VSA):
     def random(
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
-        """See `VSA.random`: normal with mean 0 and variance 1/d."""
+        """Normal elements with mean 0 and variance 1/d."""
         self.require_room(shape, 2 * self.dtype.itemsize, generator)
         source = generator.device if generator is not None else device
         normal = torch.randn(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
         return (normal / self.dim**0.5).to(device if device is not None else source)
 
     def identity(self) -> Shaped[Tensor, "d"]:
-        """One at index 0, zero elsewhere."""
+        """1 at index 0, 0 elsewhere."""
         self.require_room((), self.dtype.itemsize)
         unit = torch.zeros(self.dim, dtype=self.dtype)
         unit[0] = 1
         return unit
 
-    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """Circular convolution, by way of the Fourier transform."""
-        self.check(a, "a")
-        self.check(b, "b")
+    def _bind(self, a: Tensor, b: Tensor) -> Tensor:
         return self._convolve(a, b, conjugate=False)
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
-    ) -> Shaped[Tensor, "*#batch d"]:
-        """Circular correlation: convolution with the key's approximate inverse."""
-        self.check(bound, "bound")
-        self.check(key, "key")
+    def _unbind(self, bound: Tensor, key: Tensor) -> Tensor:
         return self._convolve(bound, key, conjugate=True)
 
     def _convolve(self, a: Tensor, b: Tensor, conjugate: bool) -> Tensor:
         if a.numel() == 0 or b.numel() == 0:
-            # The Fourier transform refuses an empty batch; a product has its shape.
+            # The Fourier transform refuses an empty batch; the product has the right shape.
             return a * b
         spectrum = torch.fft.rfft(b)
         return torch.fft.irfft(torch.fft.rfft(a) * (spectrum.conj() if conjugate else spectrum), n=self.dim)
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Scale to length 1; zero stays zero."""
+        """Scale to length 1; a zero vector stays zero."""
         rows, lengths, _ = in_range(raw)
         return safe_divide(rows, lengths[..., None].to(rows.dtype))
 
     @property
     def frequencies(self) -> int:
-        """See `VSA.frequencies`: those strictly between 0 and d / 2, whose angles are free in a real vector."""
+        """The frequencies strictly between 0 and d / 2, whose angles are free in a real vector."""
         return (self.dim - 1) // 2
 
     def from_angles(self, angles: Float[Tensor, "*batch frequencies"]) -> Shaped[Tensor, "*batch d"]:
-        """See `VSA.from_angles`: the inverse Fourier transform, of length 1."""
+        """The inverse Fourier transform of these angles; its length is 1."""
         if 0 in angles.shape[:-1]:
             # The Fourier transform refuses an empty batch.
             return angles.new_zeros(*angles.shape[:-1], self.dim, dtype=self.dtype)
@@ -81,11 +74,11 @@ class HRR(VSA):
         return torch.fft.irfft(torch.polar(torch.ones_like(whole), whole), n=self.dim).to(self.dtype)
 
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
-        # Ten standard deviations: no element of a drawn hypervector is ever so far from 0.
+        # Ten standard deviations: no drawn element is that far from 0.
         return bool((x.abs() <= 10 / self.dim**0.5).all())
 
     def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
-        """Estimate x from the bundle: two near-orthogonal vectors of length 1 have a sum of length √2."""
+        """Estimate `x`: the sum of two nearly orthogonal vectors of length 1 has length √2."""
         return self.normalize(bundled * 2**0.5 - known)

@@ -1,36 +1,37 @@
-"""Multiply-Add-Permute: the architecture of the paper."""
+"""Multiply-Add-Permute."""
 
 from typing import Literal
 
 import torch
-from jaxtyping import Float, Int, Shaped
+from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa._checks import narrowed, refuse_nan
-from torchvsa._kernels.look_up import gather_reduce
 from torchvsa._numerics import inner_products, is_integer, safe_sqrt, units, widened
 from torchvsa.architectures._random import random_bits
 from torchvsa.architectures._sums import multiplied, stacked
-from torchvsa.architectures._ties import first_two
+from torchvsa.architectures._ties import tie_voters
 from torchvsa.architectures.base import VSA, Summands
 
 
 class MAP(VSA):
-    """Multiply-Add-Permute: bind is the product, bundle the sum, permute a rotation.
+    """Multiply-Add-Permute: bind and unbind are the element-wise product, bundle is the sum, permute a rotation.
 
-    | variant | atoms | bundle |
+    | variant | elements of `random` | bundle |
     |---|---|---|
-    | C | in [-1, 1] (bipolar, or `atoms="uniform"`) | the sum, clipped to [-1, 1] |
-    | B | -1 / +1 | the sign of the sum; a split vote is decided by `permute(bind(x1, x2), 1)` |
+    | C | -1 / +1, or uniform in [-1, 1] with `atoms="uniform"` | the sum, clipped to [-1, 1] |
+    | B | -1 / +1 | the sign of the sum; `permute(bind(x1, x2), 1)` decides ties |
     | I | -1 / +1 | the sum |
 
-    `dtype=torch.float32` is differentiable; `torch.int8` holds integer codes, exact and smallest, whose sums
-    accumulate in int32. Codes in int8 must be -1, 0 or +1, which no verb checks: others may wrap around in `bind`,
-    records and protections. `superpose`, `bundle` and `similarity` are right for any int8 numbers, as is every verb for
-    accumulators in int32.
+    Unbind is exact for keys of -1 / +1. `dtype=torch.float32` is differentiable. `torch.int8` is exact and smallest;
+    sums accumulate in int32. Elements in int8 must be -1, 0 or +1, which no method checks: others may wrap around in
+    `bind`, records and protections. `superpose`, `bundle` and `similarity` are right for any int8 numbers, and every
+    method is for accumulators in int32.
 
     Source: Gayler 1998; Neubert et al. 2016, section II (variant C).
     """
+
+    in_place = "mul_"
 
     def __init__(
         self,
@@ -53,17 +54,18 @@ class MAP(VSA):
         self.atoms = atoms
         self.name = f"MAP-{variant}"
         self.breaks_ties = variant == "B"
+        self.clips = variant == "C"
         self.self_inverse = atoms == "bipolar"
 
     def config(self) -> dict[str, str | int]:
-        """See `VSA.config`; names the atoms too where they are not the default."""
+        """Name, dim and dtype, and the atoms if they are not the default."""
         return super().config() | ({} if self.atoms == "bipolar" else {"atoms": self.atoms})
 
     def random(
         self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
     ) -> Shaped[Tensor, "*shape d"]:
-        """See `VSA.random`: bipolar -1 / +1 with equal chance, or uniform in [-1, 1]."""
-        # Bits, codes made of them, and those in another type; or uniform numbers, twice moved.
+        """Elements of -1 / +1 with equal probability, or uniform in [-1, 1]."""
+        # Bits, int8 elements and those in another type; or uniform numbers, scaled and shifted.
         size = self.dtype.itemsize
         self.require_room(shape, 3 * size if size == 1 or self.atoms == "uniform" else 2 + size, generator)
         if self.atoms == "uniform":
@@ -78,28 +80,13 @@ class MAP(VSA):
         self.require_room((), self.dtype.itemsize)
         return torch.ones(self.dim, dtype=self.dtype)
 
-    def bind(self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]) -> Shaped[Tensor, "*#batch d"]:
-        """The element-wise product; its own inverse on -1 / +1.
-
-        Two raw accumulators of integers are refused (`ValueError`) if a product does not fit their type, where values
-        can be looked at: see `superpose`.
-        """
-        self.check(a, "a")
-        self.check(b, "b")
+    def _bind(self, a: Tensor, b: Tensor) -> Tensor:
         return multiplied(a, b)
 
-    def unbind(
-        self, bound: Shaped[Tensor, "*#batch d"], key: Shaped[Tensor, "*#batch d"]
-    ) -> Shaped[Tensor, "*#batch d"]:
-        """The element-wise product again: exact for keys of -1 / +1."""
-        self.check(bound, "bound")
-        self.check(key, "key")
-        return multiplied(bound, key)
-
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """C: clip to [-1, 1], keeping 0; integer codes are the nearest ones. I: the sum itself. B: the sign.
+        """C: clip to [-1, 1], keeping 0; for int8, round to the nearest element. I: the sum itself. B: the sign.
 
-        A raw sum no longer knows its voters, so B decides its zeros by the sum's own signs, shifted by one.
+        A raw sum does not hold its summands, so in variant B its own signs, rotated by one, decide its zeros.
         """
         if raw.is_floating_point() and (self.integer or self.variant == "B"):
             refuse_nan(raw, "the sum")
@@ -115,31 +102,16 @@ class MAP(VSA):
     def bundle(
         self, xs: Summands, dim: int = -2, weights: Shaped[Tensor, "..."] | None = None
     ) -> Shaped[Tensor, "..."]:
-        """See `VSA.bundle`; the variants differ as the class says."""
+        """The sum, normalised as the variant says."""
         xs, dim = stacked(xs, dim)
         raw = self.superpose(xs, dim, weights)
-        if self.variant == "B" and (voters := first_two(xs, dim, weights)) is not None:
+        if self.variant == "B" and (voters := tie_voters(xs, dim, weights)) is not None:
             return self._signs(raw, self.permute(self.bind(*voters), 1))
         return self.normalize(raw)
-
-    def _bundle_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """See `VSA._bundle_entries`."""
-        if self.variant != "C" or table.dtype != self._type_of_sums(len(table)):
-            return super()._bundle_entries(table, places)
-        return gather_reduce(table, places, Tensor.add_, clip=True)
-
-    def _bind_entries(
-        self, table: Shaped[Tensor, "k entries d"], places: Int[Tensor, "batch k"]
-    ) -> Shaped[Tensor, "batch d"]:
-        """See `VSA._bind_entries`."""
-        return gather_reduce(table, places, Tensor.mul_)
 
     def _bundle_pair(
         self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
-        """See `VSA._bundle_pair`."""
         whole = is_integer(a) or is_integer(b)
         if self.variant != "C" or (whole and not a.dtype == b.dtype == torch.int8):
             return super()._bundle_pair(a, b)
@@ -166,8 +138,8 @@ class MAP(VSA):
     ) -> Shaped[Tensor, "*#batch d"]:
         """Estimate `x` from `bundle([x, known])`.
 
-        C: exact for a bipolar x (where the sum is 0, x = -known). I: exact. B: where the bundle differs from
-        `known`, x does too; elsewhere x is taken to agree, which is right for 3 of 4 elements in all.
+        C: exact for `x` of -1 / +1 (where the sum is 0, `x = -known`). I: exact. B: the bundle itself, right for 3 of 4
+        elements: where it differs from `known`, and elsewhere if `x` agrees with `known`.
         """
         if self.variant == "C":
             return torch.where(bundled == 0, -known, bundled)
@@ -176,7 +148,7 @@ class MAP(VSA):
         return bundled
 
     def unbound_norm(self, program: Shaped[Tensor, "d"], keys: Shaped[Tensor, "*batch d"]) -> Float[Tensor, "*batch"]:
-        """The root of `key² · program²`: one product for the whole batch."""
+        """The square root of `key² · program²`: one matrix product for the batch."""
         if is_integer(program):
             return safe_sqrt(inner_products(keys.to(torch.float64) ** 2, program.to(torch.float64)[None] ** 2)[..., 0])
         program = widened(program)

@@ -1,4 +1,4 @@
-"""Encoders: readings in [0, 1], NaN for unobserved, become hypervectors."""
+"""Encoders: turn readings in [0, 1], NaN for unobserved, into hypervectors."""
 
 from torchvsa.encoders.balanced import Balanced
 from torchvsa.encoders.base import Binned, Encoder, ValueEncoder

@@ -1,4 +1,4 @@
-"""Codes that are as far apart as they can be."""
+"""Codes with the largest possible distances."""
 
 import torch
 from jaxtyping import Shaped
@@ -8,11 +8,11 @@ from torchvsa.encoders.base import Binned
 
 
 class Balanced(Binned):
-    """Codes as far apart as they can be: in each dimension a random half of them is negated.
+    """Codes with the largest possible distances: in each dimension a random half of them is negated.
 
-    An even number of codes has the cosine -1 / (bins - 1) between any two, an odd one -1 / bins. Two are each other's
-    negative; of two random codes half of the elements agree, and cannot tell them apart. Made for the codes of
-    commands, between which a program has to decide.
+    The cosine between any two codes is -1 / (bins - 1) for an even number of codes, -1 / bins for an odd one. Two codes
+    are each other's negative, while half of the elements of two random codes agree and cannot tell them apart. Meant
+    for the codes of commands, between which a program decides.
 
     Source: a simplex of code words, as in error-correcting output codes (Dietterich and Bakiri 1995).
     """

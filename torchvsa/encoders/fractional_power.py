@@ -1,4 +1,4 @@
-"""Continuous codes: a base hypervector bound to itself as often as a reading says, fractions included."""
+"""Continuous codes: fractional powers of a base hypervector under binding."""
 
 import math
 from typing import Any, Literal
@@ -44,7 +44,7 @@ class FractionalPower(ValueEncoder):
         if kernel not in ("sinc", "gaussian"):
             raise ValueError(f"kernel is 'sinc' or 'gaussian'; got {kernel!r}")
         if not (isinstance(length, int | float) and 0 < length < math.inf):
-            raise ValueError(f"length is the distance in units of which the kernel falls, above 0; got {length!r}")
+            raise ValueError(f"length is the unit of distance of the kernel, above 0; got {length!r}")
         self.vsa, self.length, self.kernel = vsa, float(length), kernel
         self._own(seed)
 
@@ -54,20 +54,20 @@ class FractionalPower(ValueEncoder):
         return {"theta": (torch.float64, (self.vsa.frequencies,))}
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name, the length and the kernel."""
         return {"name": self.name, "length": self.length, "kernel": self.kernel}
 
     def check(self) -> None:
-        """See `Part.check`."""
+        """Raise `ValueError` unless all angles are finite."""
         if not self.theta.isfinite().all():
             raise ValueError("theta must hold finite angles")
 
     def cells(self, x: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
-        """The readings themselves."""
+        """The readings, and -1 for NaN."""
         return continuous(x)
 
     def encode(self, cells: Float[Tensor, "*batch"]) -> Shaped[Tensor, "*batch d"]:
-        """The power of each reading."""
+        """The base hypervector to the power of each reading."""
         return self.vsa.from_angles(cells[..., None].to(self.theta.dtype) / self.length * self.theta)
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:

@@ -1,4 +1,4 @@
-"""Conditions with a memory: the present one bundled with permuted past ones, so that equal readings can differ."""
+"""Encode present and past readings together."""
 
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
@@ -20,17 +20,17 @@ H = TypeVar("H", bound="History")
 class History(Encoder):
     """Encode the present readings together with those `lags` steps ago.
 
-    With `c(t)` the hypervector that `present` gives the readings at step t, permuted to tell the past from the present:
+    With `c(t)` the hypervector of the readings at step t from the encoder `present`, and ⊕ the bundle:
 
         c(t) ⊕ permute(c(t - lags[0]), 1) ⊕ permute(c(t - lags[1]), 2) ⊕ ...
 
-    The bundle averages the similarities of its moments: what was seen at one of them is not lost if another is odd. (A
-    product of whole past conditions would be like nothing else as soon as one reading of one moment differs.) A moment
-    without any observed sensor is left out.
+    Bundling averages the similarities of the steps: a match at one of them counts even if another differs. (A product
+    would be dissimilar to all others as soon as one reading at one step differs.) A step without an observed sensor is
+    left out.
 
-    Its inputs are windows `[B, (1 + len(lags)) · n]`, the present first. `windows` makes them of recorded readings,
-    `start` and `step` of live ones: the memory of each robot is the tensor that they hand on, and nothing else. With
-    `hold`, a reading that was not observed is replaced by the last one of its sensor that was, however old.
+    The inputs are windows `[B, (1 + len(lags)) · n]`, the present first. `windows` builds them from recorded readings,
+    `start` and `step` from live ones; the tensor that these return is all the memory of a robot. With `hold`, a reading
+    that was not observed is replaced by the last observed one of its sensor, however old.
 
     Source: permutation for order in time, e.g. Kanerva 2009, "Hyperdimensional computing", section on sequences.
     """
@@ -48,32 +48,32 @@ class History(Encoder):
 
     @property
     def width(self) -> int:
-        """Columns of a window."""
+        """The number of columns of a window."""
         return (1 + len(self.lags)) * self.sensors
 
     def own_layout(self) -> Layout:
-        """Nothing of its own."""
+        """No tensors of its own."""
         return {}
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name, the options, and the config of the encoder of the present."""
         return {"name": self.name, "present": self.present.config(), "lags": list(self.lags), "hold": self.hold}
 
     @classmethod
     def from_config(cls: type[H], config: Mapping[str, Any], vsa: VSA) -> H:
-        """See `Part.from_config`."""
+        """Make a plan from what `config` returned."""
         return cls(encoder(config["present"], vsa), config["lags"], config["hold"])
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
         return {}
 
     def cells(self, x: Float[Tensor, "batch w"]) -> Shaped[Tensor, "batch w"]:
-        """See `Encoder.cells`."""
+        """The cells of each step of the window."""
         moments = x.unflatten(1, (-1, self.sensors))
         return self.present.cells(moments.flatten(0, 1)).reshape(x.shape)
 
     def encode(self, cells: Shaped[Tensor, "batch w"]) -> Shaped[Tensor, "batch d"]:
-        """See `Encoder.encode`."""
+        """Bundle the permuted conditions of each window."""
         return by_blocks(self._encode, cells, row_bytes=2 * (1 + len(self.lags)) * self.vsa.row_bytes)
 
     def _encode(self, cells: Tensor) -> Tensor:
@@ -84,33 +84,33 @@ class History(Encoder):
         return self.vsa.bundle(conditions, weights=(cells >= 0).any(-1).to(torch.int32))
 
     def windows(self, x: Float[Tensor, "N n"], episodes: Int64[Tensor, "N"]) -> Float[Tensor, "N w"]:
-        """The windows of recorded readings, whose rows are the steps of one episode after the other.
+        """The windows of recorded readings, whose rows are the steps of one episode after another.
 
-        Equal to what `start` and `step` give for the same readings, one by one. Raises `ValueError` if the rows of an
+        They equal those of `start` and `step` for the same readings. Raises `ValueError` if the rows of an
         episode are not next to each other.
         """
         return windows(x, episodes, self.lags, self.hold)
 
     def start(self, batch: int) -> Float[Tensor, "batch past n"]:
-        """No past: all of it NaN."""
+        """An empty memory: all NaN."""
         return no_past(batch, self.sensors, self.lags, self.hold)
 
     def step(
         self, x: Float[Tensor, "batch n"], past: Float[Tensor, "batch past n"]
     ) -> tuple[Float[Tensor, "batch w"], Float[Tensor, "batch past n"]]:
-        """The window of these readings, and the past of the next step."""
+        """The window of these readings, and the memory for the next step."""
         return window(x, past, self.lags, self.hold)
 
 
 def no_past(batch: int, sensors: int, lags: Sequence[int], hold: bool = False) -> Float[Tensor, "batch past n"]:
-    """What is remembered before the first step: NaN. The latest readings come first."""
+    """The memory before the first step: all NaN. The latest readings come first."""
     return torch.full((batch, max(lags, default=int(hold)), sensors), torch.nan, dtype=torch.float64)
 
 
 def window(
     x: Float[Tensor, "batch n"], past: Float[Tensor, "batch past n"], lags: Sequence[int], hold: bool = False
 ) -> tuple[Float[Tensor, "batch w"], Float[Tensor, "batch past n"]]:
-    """The window of these readings after `past`, and the past of the next step; see `History.step`."""
+    """The window of readings `x` after `past`, and the memory for the next step (see `History.step`)."""
     if hold:
         x = torch.where(x.isnan(), past[:, 0], x)
     seen = torch.cat([x[:, None].to(past.dtype), past], 1)
@@ -120,11 +120,11 @@ def window(
 def windows(
     x: Float[Tensor, "N n"], episodes: Int64[Tensor, "N"], lags: Sequence[int], hold: bool = False
 ) -> Float[Tensor, "N w"]:
-    """Each row with those `lags` rows before it in its episode, NaN where there are none; see `History.windows`."""
+    """Join each row with the rows `lags` before it in its episode, or NaN (see `History.windows`)."""
     begins = torch.ones(len(episodes), dtype=torch.bool, device=episodes.device)
     begins[1:] = episodes[1:] != episodes[:-1]
     if int(begins.sum()) != len(episodes.unique()):
-        raise ValueError("the rows of an episode must stand together, in the order of its steps")
+        raise ValueError("the rows of an episode must be next to each other, in the order of its steps")
     if hold:
         x = _held(x, begins)
     columns = [x]
@@ -138,20 +138,20 @@ def windows(
 
 
 def _held(x: Tensor, begins: Tensor) -> Tensor:
-    """Each reading, or the last one of its sensor and episode that was observed."""
+    """Each reading or, if it is missing, the last observed one of its sensor and episode."""
     if not len(x):
         return x
     rows = torch.arange(len(x), device=x.device)[:, None].expand_as(x)
-    # The first row of an episode counts as observed: what it lacks stays missing, and nothing older comes after it.
+    # The first row of an episode counts as observed, so that no reading comes from an earlier episode.
     source = torch.where(x.isnan() & ~begins[:, None], 0, rows).cummax(0).values
     return x.gather(0, source)
 
 
 def check_lags(lags: Sequence[int]) -> tuple[int, ...]:
-    """The lags as a tuple. Raises `ValueError` unless they are whole numbers of steps, growing, 1 to 100,000."""
-    given = tuple(lags)
-    if any(isinstance(lag, bool) or not isinstance(lag, int) or not 1 <= lag <= 100_000 for lag in given) or any(
-        later <= sooner for sooner, later in pairwise(given)
+    """The lags as a tuple. Raises `ValueError` unless they are increasing whole numbers from 1 to 100,000."""
+    checked = tuple(lags)
+    if any(isinstance(lag, bool) or not isinstance(lag, int) or not 1 <= lag <= 100_000 for lag in checked) or any(
+        later <= earlier for earlier, later in pairwise(checked)
     ):
-        raise ValueError(f"lags are growing numbers of steps, 1 or more (up to 100,000); got {list(given)}")
-    return given
+        raise ValueError(f"lags are increasing whole numbers of steps from 1 to 100,000; got {list(checked)}")
+    return checked

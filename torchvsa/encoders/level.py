@@ -1,4 +1,4 @@
-"""Codes whose similarity falls linearly with distance."""
+"""Codes whose similarity falls linearly with the distance of their bins."""
 
 from typing import Any
 
@@ -11,12 +11,12 @@ from torchvsa.encoders.base import Binned, whole
 
 
 class Level(Binned):
-    """Level codes: similarity falls linearly with the distance in bins, 1 - |i - j| / span, and is about 0 from there.
+    """Level codes: similarity is 1 - |i - j| / span for bins i and j, and about 0 from a distance of `span` bins on.
 
-    Every `span` bins there is an independent random hypervector; between two of them, elements change over one by
-    one, always in the same random order (with an order of its own for each stretch, codes `span` apart would still
-    share up to a quarter of their elements). By default the span is the whole range, so that the two ends are
-    independent and the kernel is 1 - |x - y|. `span=1` is the lookup table.
+    Every `span` bins there is an independent random hypervector. Between two of them, elements are replaced one by one,
+    always in the same random order (with another order for each stretch, codes `span` bins apart would still share up
+    to a quarter of their elements). By default the span is the whole range, so that both ends are independent and the
+    kernel is 1 - |x - y|. `span=1` gives independent codes, as `Lookup` does.
 
     Source: Rachkovskij et al. 2005; Kleyko et al. 2018 for the linear kernel.
     """
@@ -28,7 +28,7 @@ class Level(Binned):
         super().__init__(vsa, bins, seed)
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name, the number of bins, and the span."""
         return super().config() | {"span": self.span}
 
     def _codes(self, generator: torch.Generator | None) -> Shaped[Tensor, "bins d"]:
@@ -42,6 +42,6 @@ class Level(Binned):
             if step == 0:
                 codes.append(anchors[segment])
             else:
-                # Integer comparison: exactly d · step / span, rounded up, elements have changed over.
+                # In integers, so that exactly ceil(d · step / span) elements are replaced.
                 codes.append(torch.where(order * span < self.vsa.dim * step, anchors[segment + 1], anchors[segment]))
         return torch.stack(codes)

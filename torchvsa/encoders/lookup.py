@@ -1,4 +1,4 @@
-"""Independent codes for the bins of a value."""
+"""Independent codes per bin."""
 
 import torch
 from jaxtyping import Shaped
@@ -8,7 +8,7 @@ from torchvsa.encoders.base import Binned
 
 
 class Lookup(Binned):
-    """A table of independent random hypervectors: similarity 1 within a bin, about 0 otherwise.
+    """Independent random hypervectors: similarity 1 within a bin, about 0 between bins.
 
     Source: Neubert et al. 2016, section II.
     """

@@ -1,4 +1,4 @@
-"""Records that bind what the sensors read."""
+"""Records that bind the sensors' readings."""
 
 from collections.abc import Mapping
 from functools import reduce
@@ -7,17 +7,17 @@ import torch
 from jaxtyping import Bool, Int64, Shaped
 from torch import Tensor
 
-from torchvsa.encoders.record import Record, places
+from torchvsa.architectures._entries import bind_entries
+from torchvsa.encoders.record import Record, entry_indices
 from torchvsa.part import Layout
 
 
 class Product(Record):
     """The product of the role-bound values. Its kernel **multiplies** the kernels of the values.
 
-    Where binding commutes, a product of roles and shared values would not say which sensor had which value; the i-th
-    role-bound value is therefore permuted i times. Where binding does not act element by element a rotation can be
-    moved out of the product (circular convolution commutes with it), so that the elements of each sensor but the first
-    take a random order instead.
+    If binding commutes, a product of roles and shared values does not tell which sensor has which value. Therefore the
+    i-th role-bound value is permuted i times. Circular convolution commutes with rotations too, so architectures whose
+    binding is not element-wise permute the elements of each sensor but the first in a random order instead.
     """
 
     name = "product"
@@ -28,13 +28,13 @@ class Product(Record):
         return not self.vsa.elementwise
 
     def own_layout(self) -> Layout:
-        """`roles` `[n, d]`; with bindings that are not element-wise an order of the dimensions per sensor."""
+        """`roles` `[n, d]`, and `arrangement` `[n, d]`, an order of the dimensions, if binding is not element-wise."""
         layout = super().own_layout()
         shape = self.sensors, self.vsa.dim
         return layout | {"arrangement": (torch.int64, shape)} if self._reorders else layout
 
     def check(self) -> None:
-        """See `Part.check`."""
+        """Raise `ValueError` unless roles are hypervectors and each arrangement is a permutation."""
         super().check()
         if self._reorders:
             ordered = self.arrangement.sort(-1).values
@@ -57,7 +57,7 @@ class Product(Record):
         return self.vsa.identity().to(like)
 
     def _join(self, table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        return self.vsa._bind_entries(table, places(table, cells))
+        return bind_entries(self.vsa, table, entry_indices(table, cells))
 
     def _combine(
         self, bound: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]

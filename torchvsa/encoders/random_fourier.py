@@ -14,11 +14,11 @@ from torchvsa.part import Layout
 
 
 class RandomFourier(Encoder):
-    """Random Fourier features √2·cos(ω·x / length + b): conditions are as similar as e^(-|x - y|² / (2·length²)) says.
+    """Random Fourier features √2·cos(ω·x / length + b), whose kernel is e^(-|x - y|² / (2·length²)).
 
-    With `sign` each element is the sign of its cosine, which fits integer codes; the kernel is then
+    With `sign` each element is the sign of its cosine, which suits integers; the kernel is then
     (8 / π²)·Σ K(j·Δ) / j² over odd j, with K the Gaussian. A reading that was not observed is left out of ω·x. Needs
-    an architecture of real numbers that binds element by element; without `sign`, of floats.
+    an architecture with real elements and element-wise binding; without `sign`, with float elements.
 
     Source: Rahimi and Recht 2007, "Random features for large-scale kernel machines"; Raginsky and Lazebnik 2009 for
     the signs.
@@ -32,7 +32,9 @@ class RandomFourier(Encoder):
     def __init__(self, vsa: VSA, sensors: int, length: float = 0.2, sign: bool = True, seed: int | None = None) -> None:
         super().__init__()
         if vsa.dtype.is_complex or vsa.dtype == torch.bool or not vsa.elementwise:
-            raise ValueError(f"random Fourier features need real elements that bind one by one, which {vsa.name} lacks")
+            raise ValueError(
+                f"random Fourier features need real elements and element-wise binding; {vsa.name} lacks them"
+            )
         if not sign and not vsa.dtype.is_floating_point:
             raise ValueError(f"{vsa} holds no fractions; take sign=True, or a float dtype")
         if not (isinstance(length, int | float) and 0 < length < math.inf):
@@ -46,23 +48,23 @@ class RandomFourier(Encoder):
         return {"omega": (torch.float64, (self.sensors, dim)), "phase": (torch.float64, (dim,))}
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name and the options."""
         return {"name": self.name, "sensors": self.sensors, "length": self.length, "sign": self.sign}
 
     def check(self) -> None:
-        """See `Part.check`."""
+        """Raise `ValueError` unless all numbers are finite."""
         for name in ("omega", "phase"):
             if not getattr(self, name).isfinite().all():
                 raise ValueError(f"{name} must hold finite numbers")
 
     def cells(self, x: Float[Tensor, "batch n"]) -> Float[Tensor, "batch n"]:
-        """The readings themselves."""
+        """The readings, and -1 for NaN."""
         return continuous(x)
 
     def encode(self, cells: Float[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
         """The cosine of each projection, or its sign."""
         observed = torch.where(cells < 0, 0.0, cells).to(self.omega.dtype)
-        # Summed sensor by sensor: the same bits at any batch size, which a matrix product does not promise.
+        # Sensor by sensor: the same bits at any batch size, unlike a matrix product.
         angles = self.phase.expand(len(cells), -1)
         for column, omega in zip(observed.unbind(1), self.omega, strict=True):
             angles = torch.addcmul(angles, column[:, None], omega, value=1 / self.length)

@@ -1,4 +1,4 @@
-"""Role-filler records: the readings of several sensors become one hypervector."""
+"""Role-filler records: several readings in one hypervector."""
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
@@ -19,13 +19,13 @@ R = TypeVar("R", bound="Record")
 
 
 class Record(Encoder):
-    """What `Sum`, `Product` and `SubsetProduct` share: a random role per sensor, bound to the code of its reading.
+    """The base of `Sum`, `Product` and `SubsetProduct`: binds a random role per sensor to the code of its reading.
 
-    `values` encodes the reading of every sensor, or is a list with one value encoder per sensor. Where all of them have
-    bins, the role-bound values are kept as a table of n · (bins + 1) · d elements (24 sensors, 64 bins, d = 4,000,
-    int8: 6 MB), which follows from the codebooks and is in no `state_dict`.
+    `values` is one value encoder for all sensors, or a list with one per sensor. If all of them have bins, the
+    role-bound values are kept as a table of n · (bins + 1) · d elements (24 sensors, 64 bins, d = 4,000, int8: 6 MB).
+    It is computed from the codebooks and is not part of `state_dict`.
 
-    A new record implements `_join`, `_combine` and `_absent`, and where it needs to `_arrange` and `_bound`.
+    A new record implements `_join`, `_combine` and `_absent`, and overrides `_arrange` and `_bound` if needed.
 
     Source: Neubert et al. 2016, Algorithm 1, line 3.
     """
@@ -52,7 +52,7 @@ class Record(Encoder):
             raise ValueError("all value encoders of a record must be of the same architecture")
         self.vsa, self.shared = given[0].vsa, shared
         self.sensors = whole("sensors", len(given) if sensors is None else sensors)
-        # One value encoder given for several sensors stays one.
+        # A value encoder that is listed for several sensors is copied once.
         copies = {id(value): planned(value) for value in given}
         self.values = nn.ModuleList([copies[id(value)] for value in given])
         self.discrete = all(value.discrete for value in copies.values())
@@ -61,34 +61,34 @@ class Record(Encoder):
 
     @property
     def _values(self) -> list[ValueEncoder]:
-        """The value encoder of all sensors, or those of each."""
+        """The value encoders: one for all sensors, or one per sensor."""
         values: Any = list(self.values)
         return values
 
     @property
     def value(self) -> ValueEncoder:
-        """The value encoder of all sensors. Raises `ValueError` if each has its own."""
+        """The value encoder of all sensors. Raises `ValueError` if there is one per sensor."""
         if not self.shared:
-            raise ValueError("each sensor of this record has a value encoder of its own; see `values`")
+            raise ValueError("this record has one value encoder per sensor; see `values`")
         return self._values[0]
 
     @property
     def codes(self) -> Shaped[Tensor, "bins d"]:
-        """The codes of the bins that all sensors share. Raises `ValueError` if there are none."""
+        """The codes of the bins, common to all sensors. Raises `ValueError` if there are none."""
         if not isinstance(self.value, Binned):
             raise ValueError("a continuous value encoder has no codes of bins")
         return self.value.codes
 
     @property
     def bins(self) -> int:
-        """Bins per sensor, the most where sensors differ. Raises `ValueError` for continuous value encoders."""
+        """The largest number of bins per sensor. Raises `ValueError` for continuous value encoders."""
         values: Any = self._values
         if not self.discrete:
             raise ValueError("a continuous value encoder has no bins")
         return max(value.bins for value in values)
 
     def parts(self) -> dict[str, Part]:
-        """See `Part.parts`: the value encoders, each once."""
+        """The value encoders, each once."""
         return {f"values.{number}": value for number, value in enumerate(self.values) if isinstance(value, Part)}
 
     def own_layout(self) -> Layout:
@@ -96,30 +96,30 @@ class Record(Encoder):
         return {"roles": (self.vsa.dtype, (self.sensors, self.vsa.dim))}
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name, the configs of the value encoders, and the number of sensors."""
         values = [value.config() for value in self._values]
         return {"name": self.name, "values": values[0] if self.shared else values, "sensors": self.sensors}
 
     @classmethod
     def from_config(cls: type[R], config: Mapping[str, Any], vsa: VSA) -> R:
-        """See `Part.from_config`."""
+        """Make a plan from what `config` returned."""
         options = {key: value for key, value in config.items() if key not in ("name", "values")}
         given = config["values"]
         one = isinstance(given, Mapping)
         return cls(value_encoder(given, vsa) if one else [value_encoder(value, vsa) for value in given], **options)
 
     def cells(self, x: Float[Tensor, "batch n"]) -> Shaped[Tensor, "batch n"]:
-        """See `Encoder.cells`."""
+        """The cell of each reading, from its value encoder."""
         if self.shared:
             return self._values[0].cells(x)
         columns = zip(self._values, x.unbind(1), strict=True)
-        # Bins among continuous readings become floats, as the others are.
+        # Together with continuous readings, bins are floats too.
         return torch.stack(
             [value.cells(column).to(torch.int64 if self.discrete else x.dtype) for value, column in columns], 1
         )
 
     def encode(self, cells: Shaped[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """See `Encoder.encode`."""
+        """Combine the role-bound codes of each row."""
         if self.table is not None:
             return self._join(self.table, cells)
         return by_blocks(self._encode, cells, row_bytes=2 * self.sensors * self.vsa.row_bytes)
@@ -134,31 +134,27 @@ class Record(Encoder):
     def _code(self, value: ValueEncoder, cells: Shaped[Tensor, "batch"]) -> Shaped[Tensor, "batch d"]:
         return value.encode(cells.to(torch.int64) if value.discrete else cells)
 
-    # -- what the kinds of record define ----------------------------------------------------------------
-
     def _arrange(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
-        """Draw what tells the sensors apart beside their roles."""
+        """Draw the tensors, other than roles, that tell sensors apart."""
         return {}
 
     def _bound(self, roles: Shaped[Tensor, "n 1 d"], codes: Shaped[Tensor, "#n k d"]) -> Shaped[Tensor, "n k d"]:
-        """The role-bound codes."""
+        """Bind codes to roles."""
         return self.vsa.bind(codes, roles)
 
     @abstractmethod
     def _absent(self, like: Shaped[Tensor, "..."]) -> Shaped[Tensor, "d"]:
-        """The entry of the table for a reading that was not observed, which leaves the others as they are."""
+        """The table entry for a reading that was not observed; it is neutral in `_join`."""
 
     @abstractmethod
     def _join(self, table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """Look up and combine the entries of each row of cells (-1: not observed)."""
+        """Look up and combine the entries of each row of cells, where -1 means not observed."""
 
     @abstractmethod
     def _combine(
         self, bound: Shaped[Tensor, "batch n d"], observed: Bool[Tensor, "batch n"]
     ) -> Shaped[Tensor, "batch d"]:
-        """Combine the role-bound codes of each row, those that were not observed left out."""
-
-    # -- codebooks ----------------------------------------------------------------------------------------
+        """Combine the role-bound codes of each row, without those that were not observed."""
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
         bins = max(getattr(value, "bins", 0) for value in self.values)
@@ -172,20 +168,20 @@ class Record(Encoder):
         return drawn | dict(self._arrange(generator))
 
     def derive(self) -> None:
-        """Compute the table of role-bound values from the codebooks; needed after a change of theirs in place."""
+        """Recompute the table of role-bound values. Call it after changing codebooks in place."""
         values: Any = self._values
         if not all(isinstance(value, Binned) for value in values):
             return
         if self.shared:
             bound = self._bound(self.roles[:, None], values[0].codes[None])
         else:
-            # Sensors with fewer bins than others have entries that no cell asks for.
+            # Sensors with fewer bins are padded with entries that no cell refers to.
             most = max(value.bins for value in values)
             codes = [torch.cat([value.codes, value.codes[:1].expand(most - value.bins, -1)]) for value in values]
             bound = self._bound(self.roles[:, None], torch.stack(codes))
         self.table = torch.cat([bound, self._absent(bound).expand(self.sensors, 1, self.vsa.dim)], 1)
 
 
-def places(table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
-    """Where in the table each cell is: -1 at the end."""
+def entry_indices(table: Shaped[Tensor, "n entries d"], cells: Int64[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
+    """The index of each cell's entry in the table; the last entry is for -1."""
     return torch.where(cells < 0, table.shape[1] - 1, cells)

@@ -12,10 +12,10 @@ ENCODERS: Registry[type[Encoder]] = Registry("encoder")
 
 
 def value_encoder(config: Mapping[str, Any], vsa: VSA) -> ValueEncoder:
-    """The value encoder that a `config()` describes, as a plan."""
+    """Make the value encoder that `config()` describes, as a plan (without codebooks)."""
     return VALUE_ENCODERS.find(config.get("name")).from_config(config, vsa)
 
 
 def encoder(config: Mapping[str, Any], vsa: VSA) -> Encoder:
-    """The encoder that a `config()` describes, as a plan."""
+    """Make the encoder that `config()` describes, as a plan (without codebooks)."""
     return ENCODERS.find(config.get("name")).from_config(config, vsa)

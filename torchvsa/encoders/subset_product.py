@@ -1,4 +1,4 @@
-"""Records that bind another few of the sensors in each dimension."""
+"""Records that bind a random subset of the sensors in each dimension."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -13,11 +13,10 @@ from torchvsa.part import Layout
 
 
 class SubsetProduct(Product):
-    """The product over a random subset of the sensors, another one for each dimension of the hypervector.
+    """The product over a random subset of the sensors, drawn for each dimension of the hypervector.
 
-    Each dimension sees an interaction of at most `subset` sensors (of any number of them, by default), so that
-    sensors without a say disturb only the dimensions that hold them. Needs an architecture that binds element by
-    element.
+    A dimension depends on 1 to `subset` sensors (by default on any number), so that irrelevant sensors disturb only the
+    dimensions that contain them. Needs an architecture with element-wise binding.
     """
 
     name = "subset_product"
@@ -34,17 +33,17 @@ class SubsetProduct(Product):
         super().__init__(values, sensors, seed)
 
     def own_layout(self) -> Layout:
-        """`roles` `[n, d]` and `chosen` `[n, d]`, which sensors each dimension sees."""
+        """`roles` `[n, d]`, and `chosen` `[n, d]`: whether the dimension depends on the sensor."""
         if not self.vsa.elementwise:
             raise ValueError(f"a subset of sensors per dimension needs element-wise binding, which {self.vsa} lacks")
         return super().own_layout() | {"chosen": (torch.bool, (self.sensors, self.vsa.dim))}
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The config of a record, and the size of the subsets."""
         return super().config() | {"subset": self.subset}
 
     def check(self) -> None:
-        """See `Part.check`."""
+        """Raise `ValueError` unless roles are hypervectors."""
         self.vsa.check_codes(self.roles, "roles")
 
     def _arrange(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:

@@ -1,4 +1,4 @@
-"""Codes that change into their opposite from one end of the range to the other."""
+"""Codes that turn into their negative from one end of the range to the other."""
 
 import torch
 from jaxtyping import Shaped
@@ -10,8 +10,8 @@ from torchvsa.encoders.base import Binned
 class Thermometer(Binned):
     """Thermometer codes: similarity falls linearly from 1 to -1, as 1 - 2·|x - y|.
 
-    From one bin to the next some elements are negated, in a random order; at the upper end all are. Needs an
-    architecture that can negate.
+    From bin to bin more elements are negated, in a random order; at the upper end all are. Needs a `negatable`
+    architecture.
 
     Source: Kleyko et al. 2018, "Classification and recall with binary hyperdimensional computing".
     """

@@ -1,4 +1,4 @@
-"""A few thresholds per dimension: conditions whose elements each ask about a few sensors."""
+"""Random boxes: each dimension compares a few sensors with thresholds."""
 
 from collections.abc import Sequence
 from typing import Any, Literal
@@ -14,42 +14,40 @@ from torchvsa.encoders.base import Encoder, binned, whole
 from torchvsa.part import Layout
 
 _CONSTANT = 1 / 16
-"""The share of dimensions that ask nothing: few, and enough to carry a constant answer."""
+"""The fraction of dimensions without a comparison: few, but enough for a constant answer."""
 _MOST_CATEGORIES = 2**20
-"""The positions (i + 0.5) / c of so many categories are distinct in float32 too."""
+"""Up to this number of categories c, the positions (i + 0.5) / c are distinct in float32."""
 Kind = Literal["real", "angle"] | int
-"""What a sensor is asked; see `ThresholdFeatures`."""
+"""The kind of a sensor; an int is a number of categories (see `ThresholdFeatures`)."""
 
 
 class ThresholdFeatures(Encoder):
     """Encode rows of readings by a few comparisons per dimension.
 
-    Each dimension draws 1 to `subset` sensors, and for each of them a threshold and a side of it. It holds a random
-    element, negated where all of its sensors are on their sides: an axis-aligned box, as the leaf of a tree is, but
-    drawn blindly. With one sensor the kernel is that of thermometer codes, which falls linearly from 1 to almost -1:
-    one dimension in 16 asks nothing, or a program would have to answer one end of the range with the opposite of the
-    other.
+    Each dimension is a random axis-aligned box over 1 to `subset` sensors, like the leaf of a tree but drawn without
+    data: it has a threshold and a side for each of its sensors. Its element is random, and negated inside the box. With
+    one sensor the kernel is that of thermometer codes, which falls linearly from 1 to almost -1. One dimension in 16
+    has no comparison; otherwise a program would have to give opposite answers at both ends of the range.
 
-    A reading that was not observed is not asked: the sensors that are left decide, and a dimension without any is not
+    A reading that was not observed is not compared: the other sensors decide, and without any the element is not
     negated.
 
-    Thresholds lie between `bins` bins, of equal width or, with `edges`, one sorted tensor of at most bins - 1 values in
-    [0, 1] per sensor (see `quantile_edges` of the behaviours), between those; an edge belongs to the bin above it. No
-    table is kept, so there may be as many bins as there are readings: the codebooks are 3 · subset · d numbers. The
-    thresholds of a sensor are spread evenly over its bins, so that few dimensions serve it well. Needs an architecture
-    that can negate.
+    Thresholds are between `bins` bins of equal width or, with `edges`, between bins with these edges: one sorted tensor
+    of at most bins - 1 values in [0, 1] per sensor (see `behaviours.quantile_edges`). An edge belongs to the bin above
+    it. No table is kept, so there may be as many bins as readings: the codebooks are 3 · subset · d numbers. The
+    thresholds of a sensor are spread evenly over its bins. Needs a `negatable` architecture.
 
-    `kinds`, one per sensor, says what each of them is asked; all are "real", if left out. The kernels are those of one
-    sensor alone, but for the dimensions that ask nothing.
+    `kinds` has one entry per sensor; all are "real" by default. The kernels are those of one sensor, apart from the
+    dimensions without a comparison.
 
-    | kind | the question | kernel |
+    | kind | comparison | kernel |
     |---|---|---|
     | `"real"` | Is the reading above a threshold? | 1 - 2·|difference| |
     | `"angle"` | Is it in the half circle that begins at an angle? | 1 - 4·δ, with δ the distance in turns |
     | a number c | Is it in a random half of c categories? | 1 for the same, else -1 / (c - 1), or -1 / c for odd c |
 
-    For an angle 0 and 1 are the same, and there must be an even number of bins. Category i of c is at (i + 0.5) / c, or
-    anywhere from i / c to (i + 1) / c. Neither has edges. Categories take another subset · d · c booleans, for the
+    An angle needs an even number of bins; 0 and 1 are the same. Category i of c is any reading from i / c to
+    (i + 1) / c, usually (i + 0.5) / c. Neither kind has edges. Categories take another subset · d · c booleans, for the
     largest c.
 
     Source: thermometer codes, Kleyko et al. 2018; random features of boxes, as in random forests (Breiman 2001),
@@ -83,13 +81,13 @@ class ThresholdFeatures(Encoder):
         self.kinds = _kinds(kinds, self.sensors, self.bins)
         self._most_categories = max([0, *(kind for kind in self.kinds or () if isinstance(kind, int))])
         if self.kinds is not None:
-            # They follow from the kinds, so that no file holds them.
+            # Computed from the kinds, so no file holds them.
             sizes = [self.bins if isinstance(kind, str) else kind for kind in self.kinds]
             self.register_buffer("sizes", torch.tensor(sizes), persistent=False)
             self.register_buffer("angle", torch.tensor([kind == "angle" for kind in self.kinds]), persistent=False)
             categories = torch.tensor([not isinstance(kind, str) for kind in self.kinds])
             self.register_buffer("category", categories, persistent=False)
-        # A number of edges stands for those that a file brings.
+        # A number of edges announces edges that a file contains.
         rows = None if edges is None or isinstance(edges, int) else _edges(edges, self.sensors, self.bins, self.kinds)
         self._edge_count = edges if isinstance(edges, int) else None if rows is None else rows.shape[1]
         self._own(None)
@@ -103,9 +101,9 @@ class ThresholdFeatures(Encoder):
         return min(self.subset or self.sensors, self.sensors)
 
     def own_layout(self) -> Layout:
-        """`start_codes` `[d]`; `sensor`, `threshold` and `above` `[subset, d]`; where needed `members` and `edges`.
+        """`start_codes` `[d]`; `sensor`, `threshold` and `above` `[subset, d]`; if needed `members` and `edges`.
 
-        `members` `[subset, d, c]` holds halves of the categories, `edges` `[n, edges]` what was given.
+        `members` `[subset, d, c]` holds random halves of the categories, `edges` `[n, edges]` the given edges.
         """
         shape = self._most, self.vsa.dim
         layout: Layout = {"start_codes": (self.vsa.dtype, (self.vsa.dim,))}
@@ -117,13 +115,13 @@ class ThresholdFeatures(Encoder):
         return layout
 
     def config(self) -> dict[str, Any]:
-        """See `Part.config`."""
+        """The name and the options; edges are tensors, so it has only their number."""
         options = {"sensors": self.sensors, "bins": self.bins, "subset": self.subset, "edges": self._edge_count}
-        # Left out where all are real, as in files that know no kinds.
+        # Left out if all are real, as in files that precede kinds.
         return {"name": self.name, **options} | ({} if self.kinds is None else {"kinds": list(self.kinds)})
 
     def check(self) -> None:
-        """See `Part.check`."""
+        """Raise `ValueError` unless codes, sensors, thresholds and edges are in range."""
         self.vsa.check_codes(self.start_codes, "start_codes")
         for name, end in (("sensor", self.sensors), ("threshold", self.bins)):
             tensor = getattr(self, name)
@@ -133,7 +131,7 @@ class ThresholdFeatures(Encoder):
             _edges(list(self.edges), self.sensors, self.bins, self.kinds)
 
     def cells(self, x: Float[Tensor, "batch n"]) -> Int64[Tensor, "batch n"]:
-        """The bin of each reading: of an angle 1 is in the first one; of a category it is its number."""
+        """The bin of each reading, or the number of its category; an angle of 1 is in the first bin."""
         found = self._bins(x)
         return found if self.kinds is None else torch.where(self.angle & (x >= 1), 0, found)
 
@@ -143,7 +141,7 @@ class ThresholdFeatures(Encoder):
             return binned(x, even)
         within = x.clamp(0, 1)
         if torch.compiler.is_exporting():
-            # The same by comparisons: interchange formats have no bucket search.
+            # Comparisons instead of `searchsorted`, which ONNX lacks.
             found = (within[..., None] >= self.edges).sum(-1)
         else:
             columns = within.to(torch.float64).T.contiguous()
@@ -153,8 +151,8 @@ class ThresholdFeatures(Encoder):
         return torch.where(x.isnan(), -1, found)
 
     def encode(self, cells: Int64[Tensor, "batch n"]) -> Shaped[Tensor, "batch d"]:
-        """See `Encoder.encode`."""
-        # Dimension by dimension: whole columns are copied and compared far faster than rows are gathered.
+        """Negate the elements of the dimensions whose box contains the reading."""
+        # Dimensions first: copying and comparing whole columns is far faster than gathering rows.
         columns = cells.T.contiguous()
         missing = columns < 0
         against = blind = None
@@ -172,26 +170,26 @@ class ThresholdFeatures(Encoder):
         return torch.where(negated, self.vsa.negative(self.start_codes), self.start_codes)
 
     def _side(self, place: int, cells: Int64[Tensor, "d batch"]) -> Bool[Tensor, "d batch"]:
-        """The answers to the question that each dimension asks at this place, where yes and no are drawn alike."""
+        """The result of the comparison number `place` of each dimension, before `above` selects a side."""
         threshold = self.threshold[place]
         side = cells > threshold[:, None]
         if self.kinds is None:
             return side
         sensor = self.sensor[place]
-        # A half circle that does not hold the end of the range; the others are its opposites.
+        # A half circle that does not contain the end of the range; `above` selects the opposite one.
         reach = torch.where(self.angle, self.bins // 2, self.bins).index_select(0, sensor)
         side = side & (cells <= (threshold + reach)[:, None])
         if not self._most_categories:
             return side
-        # Cells of other kinds are looked up in vain.
+        # The results for other kinds are discarded.
         chosen = self.members[place].gather(1, cells.clamp(0, self._most_categories - 1))
         category = self.category.index_select(0, sensor)[:, None]
-        # Not `torch.where`, which onnxruntime does not know for booleans.
+        # Not `torch.where`, which onnxruntime does not support for booleans.
         return (chosen & category) | (side & ~category)
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
         vsa, most, categories = self.vsa, self._most, self._most_categories
-        # Random numbers, their ranks and twice those are 20 bytes for each category.
+        # Random numbers, their ranks and twice the ranks take 20 bytes per category.
         require_memory(
             vsa.dim * (16 * (self.sensors + most) + (most + 20) * categories),
             f"drawing thresholds for {self.sensors:,} sensors at d = {vsa.dim:,}"
@@ -202,7 +200,7 @@ class ThresholdFeatures(Encoder):
         sizes = torch.randint(1, most + 1, (vsa.dim,), generator=generator)
         constant = torch.rand(vsa.dim, generator=generator) < _CONSTANT
         chosen = torch.rand(vsa.dim, self.sensors, generator=generator).argsort(-1)[:, :most].T.contiguous()
-        # Where a dimension has fewer sensors, its first one is in their places too.
+        # A dimension with fewer sensors repeats its first one.
         spare = torch.arange(most)[:, None] >= sizes
         threshold = torch.zeros(most, vsa.dim, dtype=torch.int64)
         members = torch.zeros(most, vsa.dim, categories, dtype=torch.bool)
@@ -214,13 +212,13 @@ class ThresholdFeatures(Encoder):
                     members[place, held, :kind] = 2 * ranks < kind
                     continue
                 held = held[torch.randperm(len(held), generator=generator)]
-                # The i-th of k dimensions passes somewhere in the i-th of k equal stretches of the range.
+                # The threshold of the i-th of k dimensions is random within the i-th of k equal parts of the range.
                 spread = (torch.arange(len(held)) + torch.rand(len(held), generator=generator)) / max(len(held), 1)
-                # An angle asks for half as many: beyond them come the opposite half circles.
+                # An angle has half as many; the others are the opposite half circles.
                 count = self.bins - 1 if kind == "real" else self.bins // 2
                 threshold[place, held] = (spread * count).long().clamp(max=max(count - 1, 0))
         above = torch.rand(most, vsa.dim, generator=generator) < 0.5
-        # Nothing is above the highest bin, nor in no category.
+        # No cell is above the highest bin or in an empty set of categories.
         threshold[0, constant], above[0, constant] = self.bins - 1, True
         drawn = {"start_codes": start}
         for name, tensor in (("sensor", chosen), ("threshold", threshold), ("above", above)):
@@ -231,7 +229,7 @@ class ThresholdFeatures(Encoder):
 
 
 def _kinds(kinds: Sequence[Kind] | None, sensors: int, bins: int) -> tuple[Kind, ...] | None:
-    """The kinds of all sensors, None if all are real. Raises `ValueError` naming the sensor for what is no kind."""
+    """The kinds of all sensors, None if all are real. Raises `ValueError` that names the sensor for a bad kind."""
     if kinds is None:
         return None
     if isinstance(kinds, str) or not isinstance(kinds, Sequence) or len(kinds) != sensors:
@@ -269,7 +267,7 @@ def _edges(
             raise ValueError(f"sensor {sensor} is an angle or a category, which has no edges; give it an empty tensor")
         if len(row) >= bins and row[bins - 1 :].isfinite().any():
             raise ValueError(
-                f"sensor {sensor} has {len(row)} edges, which part one bin more than that; the encoder has {bins}"
+                f"sensor {sensor} has {len(row)} edges, which need {len(row) + 1} bins; the encoder has {bins}"
             )
     most = max(len(row) for row in rows)
     padded = torch.full((sensors, most), torch.inf, dtype=torch.float64)

@@ -1,4 +1,4 @@
-"""Clean-up memory: the known item that a noisy hypervector resembles most."""
+"""Clean-up memory: find the item that is most similar to a noisy hypervector."""
 
 from functools import partial
 from typing import NamedTuple
@@ -13,22 +13,22 @@ from torchvsa._numerics import in_range, inner_products, norms, ordinary, over_l
 from torchvsa.errors import ShapeError
 
 _PRODUCT_BYTES = 2**27
-"""Products held at once; more queries are answered some at a time."""
+"""Memory for products; more queries are answered in blocks."""
 
 
 class Match(NamedTuple):
-    """What a clean-up memory answers, one entry per query."""
+    """The answer of a clean-up memory, one entry per query."""
 
     index: Int[Tensor, "*batch"]  # pyright: ignore[reportIncompatibleMethodOverride] (the field's own word for it)
     """The most similar item; equal similarities go to the lowest index."""
     similarity: Float[Tensor, "*batch"]
     """Its cosine with the query."""
     margin: Float[Tensor, "*batch"]
-    """How far the runner-up's cosine lies below it; inf for a single item."""
+    """The similarity minus that of the second best item; inf for a single item."""
 
 
 def best(scores: Float[Tensor, "*batch k"], lengths: Float[Tensor, "*batch"]) -> Match:
-    """The best of `k` scores (inner products over the items' lengths), as cosines with queries of these lengths."""
+    """The best of `k` scores (inner products divided by the items' lengths) for queries of these lengths."""
     top, index = scores.max(-1)
     if scores.shape[-1] == 1:
         lead = torch.where(top.isnan(), top, torch.inf)
@@ -40,18 +40,16 @@ def best(scores: Float[Tensor, "*batch k"], lengths: Float[Tensor, "*batch"]) ->
 
 
 class CleanUp(nn.Module):
-    """Compare queries `[..., d]` with items `[K, d]` by cosine and answer with the best.
+    """Find the item of `[K, d]` with the largest cosine to each query of `[..., d]`.
 
     Products of integers are exact and compared in float64, so that the answer does not depend on batch size, threads or
-    device. Products of floats are found in their own type, float32 at least; lengths of items, quotients and
-    comparisons are in float64. Answers do not depend on the scale of queries and items, however large or small.
+    device. Products of floats are computed in their own type, at least float32; lengths of items, quotients and
+    comparisons in float64. Answers do not depend on the scale of queries and items, however large or small.
 
-    A query with an element that is NaN or infinite is answered with a similarity and margin of NaN: its index means
-    nothing. Such items raise `ValueError` on a CPU; where looking at values would stall or break something (on another
-    device, in graphs, under `vmap`) all similarities are NaN.
+    A query with a NaN or infinite element has a similarity and margin of NaN, and a meaningless index. Items with one
+    raise `ValueError` on a CPU; on another device, in graphs and under `vmap` all similarities are NaN instead.
 
-    Nothing but `items` is kept, whose lengths are found anew at each call: they may change in any way. Raises
-    `ShapeError` without items.
+    The lengths of `items` are computed at each call, so `items` may be changed. Raises `ShapeError` without items.
 
     Source: Neubert et al. 2016, section II.
     """
@@ -88,20 +86,20 @@ class CleanUp(nn.Module):
 
 
 def _best(rows: Shaped[Tensor, "batch d"], items: Shaped[Tensor, "k d"], lengths: Float[Tensor, "k"]) -> Match:
-    rows, own = _measured(rows)
-    # The products of many rows are found fastest together, and looked through while in the cache.
-    work = partial(_look_through, items=lengths)
-    return by_blocks(work, inner_products(rows, items), own, row_bytes=24 * len(items))
+    rows, row_lengths = _measured(rows)
+    # One large product is fastest; its rows are compared in blocks that fit the cache.
+    work = partial(_compare, items=lengths)
+    return by_blocks(work, inner_products(rows, items), row_lengths, row_bytes=24 * len(items))
 
 
 def _measured(rows: Shaped[Tensor, "batch d"]) -> tuple[Shaped[Tensor, "batch d"], Float[Tensor, "batch"]]:
-    """Queries in a range where products fit, and their lengths."""
+    """Queries scaled so that products do not overflow, and their lengths."""
     if rows.dtype == torch.int8:
         return rows, norms(rows)
     rows = widened(rows)
     if not rows.is_floating_point():
         return in_range(rows)[:2]
-    # No item wins by the length of the query, so that floats may round it: that is read off in one pass.
+    # The length of a query does not change which item is best, so a rounded one will do, in one pass.
     lengths = torch.linalg.vector_norm(rows, dim=-1)
     if ordinary(lengths):
         return rows, lengths
@@ -109,5 +107,5 @@ def _measured(rows: Shaped[Tensor, "batch d"]) -> tuple[Shaped[Tensor, "batch d"
     return rows, torch.linalg.vector_norm(rows, dim=-1)
 
 
-def _look_through(products: Shaped[Tensor, "batch k"], own: Float[Tensor, "batch"], items: Float[Tensor, "k"]) -> Match:
-    return best(over_lengths(products, items), own)
+def _compare(products: Shaped[Tensor, "batch k"], rows: Float[Tensor, "batch"], items: Float[Tensor, "k"]) -> Match:
+    return best(over_lengths(products, items), rows)

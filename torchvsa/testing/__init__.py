@@ -1,4 +1,4 @@
-"""Laws that every part keeps, to run on parts of your own.
+"""Checks of the laws that every architecture and encoder keeps, for your own ones too.
 
 >>> import torchvsa
 >>> from torchvsa.testing import check_architecture, check_encoder, check_value_encoder
@@ -8,9 +8,9 @@
 >>> check_value_encoder(level)
 >>> check_encoder(torchvsa.encoders.Product(level, sensors=3))
 
-Each raises `AssertionError` that names the first law that the part breaks. Laws ask for what the part says of itself
-(`vsa.commutative`, `encoder.discrete` and so on), so set these attributes first. Statistical tolerances are five
-standard deviations of the similarity of unrelated hypervectors, 1/√d; take at least a few hundred dimensions.
+Each raises `AssertionError` that names the first broken law. The laws read attributes such as `vsa.commutative` and
+`encoder.discrete`, so set these first. Statistical tolerances are five standard deviations of the similarity of
+unrelated hypervectors, 1/√d: use at least a few hundred dimensions.
 """
 
 from torchvsa.testing.architectures import check_architecture

@@ -1,4 +1,4 @@
-"""How laws are run and reported."""
+"""Run laws and report the first broken one."""
 
 from collections.abc import Callable, Iterable
 from typing import TypeVar
@@ -12,7 +12,7 @@ T = TypeVar("T")
 
 
 def check(part: T, laws: Iterable[Callable[[T], None]]) -> None:
-    """Run each law on the part. Raises `AssertionError` naming the first one that does not hold."""
+    """Run each law on the part. Raises `AssertionError` that names the first broken law."""
     for law in laws:
         try:
             law(part)
@@ -23,18 +23,18 @@ def check(part: T, laws: Iterable[Callable[[T], None]]) -> None:
 
 
 def require(holds: Tensor | bool, message: str = "it does not hold") -> None:
-    """Raise `AssertionError` with the message unless it holds, also where Python runs without assertions."""
+    """Raise `AssertionError` with the message unless it holds, even under `python -O`."""
     if not bool(holds):
         raise AssertionError(message)
 
 
 def same(a: Tensor, b: Tensor) -> None:
-    """Raise `AssertionError` unless both hold the same numbers, in the same type and shape."""
+    """Raise `AssertionError` unless both have the same values, dtype and shape."""
     assert_close(a, b, rtol=0, atol=0, equal_nan=True)
 
 
 def refuses(error: type[Exception], call: Callable[[], object]) -> None:
-    """Raise `AssertionError` unless the call raises this error, or a checker of annotations raises its own before."""
+    """Raise `AssertionError` unless the call raises this error, or a run-time type checker its own."""
     try:
         call()
     except (error, TypeCheckError):
@@ -43,5 +43,5 @@ def refuses(error: type[Exception], call: Callable[[], object]) -> None:
 
 
 def seeded(seed: int) -> torch.Generator:
-    """A generator of its own."""
+    """A new generator with this seed."""
     return torch.Generator().manual_seed(seed)

@@ -1,4 +1,4 @@
-"""The laws of the algebra."""
+"""The laws of architectures."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ from torchvsa.testing._laws import check, refuses, require, same, seeded
 
 
 def check_architecture(vsa: VSA) -> None:
-    """Check the laws of the algebra on an architecture. Raises `AssertionError` naming the law that it breaks."""
+    """Check the laws of architectures. Raises `AssertionError` that names the first broken law."""
     check(vsa, _LAWS)
 
 
@@ -115,7 +115,7 @@ def _superpose_adds_up(vsa: VSA) -> None:
 def _a_bundle_resembles_its_members_only(vsa: VSA) -> None:
     atoms = _draw(vsa, 10)
     similarity = vsa.similarity(vsa.bundle(atoms[:5]), atoms)
-    # The weakest rule is the majority: of 5 voters each keeps C(4, 2) / 2^4 = 3/8 of the similarity.
+    # The majority keeps the least: for each of 5 summands a similarity of C(4, 2) / 2^4 = 3/8.
     require(similarity[:5].min() > 3 / 8 - _chance(vsa), f"members: {similarity[:5].tolist()}")
     require(similarity[5:].abs().max() < _chance(vsa), f"others: {similarity[5:].tolist()}")
 
@@ -143,7 +143,7 @@ def _bundle_sums_over_any_dimension(vsa: VSA) -> None:
 
 def _integer_weights_repeat_and_zero_weights_leave_out(vsa: VSA) -> None:
     xs = _draw(vsa, 4)
-    # Four votes, and six: architectures that decide by majority meet ties here.
+    # An even number of summands, so that a majority has ties.
     for weights in ([1, 2, 1, 0], [0, 1, 2, 3], [0, 1, 0, 1]):
         repeated = xs.repeat_interleave(torch.tensor(weights), 0)
         assert_close(vsa.bundle(xs, weights=torch.tensor(weights)), vsa.bundle(repeated))
@@ -253,6 +253,15 @@ def _angles_add_up_under_binding(vsa: VSA) -> None:
     assert_close(vsa.unbind(vsa.bind(x, y), y), x, rtol=1e-4, atol=1e-4)
 
 
+def _a_dim_that_is_not_allowed_is_refused(vsa: VSA) -> None:
+    require(vsa.allows_dim(vsa.dim), f"its own dim, {vsa.dim}, is not allowed")
+    if vsa.name in ARCHITECTURES:
+        config = {key: value for key, value in vsa.config().items() if key != "dim"}
+        for dim in range(max(vsa.dim - 3, 1), vsa.dim + 4):
+            if not vsa.allows_dim(dim):
+                refuses(ValueError, lambda dim=dim: architecture(**config, dim=dim))  # type: ignore[arg-type]
+
+
 def _it_is_made_again_from_its_config(vsa: VSA) -> None:
     require(set(vsa.config()) >= {"name", "dim", "dtype"})
     if vsa.name in ARCHITECTURES:
@@ -260,7 +269,8 @@ def _it_is_made_again_from_its_config(vsa: VSA) -> None:
         again = architecture(**config, dim=vsa.dim)  # type: ignore[arg-type]
         require(again == vsa, f"{again} is not equal")
         require(hash(again) == hash(vsa))
-        require(architecture(**config, dim=vsa.dim + 1) != vsa)  # type: ignore[arg-type]
+        larger = next(filter(vsa.allows_dim, range(vsa.dim + 1, 4 * vsa.dim + 1)), None)
+        require(larger is None or architecture(**config, dim=larger) != vsa)  # type: ignore[arg-type]
 
 
 _LAWS: tuple[Callable[[VSA], None], ...] = (
@@ -291,5 +301,6 @@ _LAWS: tuple[Callable[[VSA], None], ...] = (
     _unbound_norm_is_the_norm_of_the_unbound,
     _a_negative_is_opposite,
     _angles_add_up_under_binding,
+    _a_dim_that_is_not_allowed_is_refused,
     _it_is_made_again_from_its_config,
 )

@@ -1,4 +1,4 @@
-"""The laws of encoders, of rows of readings and of single ones."""
+"""The laws of encoders and value encoders."""
 
 import copy
 import json
@@ -14,23 +14,23 @@ from torchvsa.encoders.base import UNOBSERVED, Encoder, ValueEncoder
 from torchvsa.errors import ShapeError
 from torchvsa.testing._laws import check, refuses, require, same, seeded
 
-_Any = Encoder | ValueEncoder
+_AnyEncoder = Encoder | ValueEncoder
 _ROWS = 24
-"""Rows in the batches that are tried: three blocks of 7, and a part of one."""
+"""Rows per batch: three blocks of 7, and a smaller one."""
 
 
 def check_encoder(encoder: Encoder) -> None:
-    """Check the laws of encoders of rows of readings. Raises `AssertionError` naming the law that it breaks.
+    """Check the laws of encoders. Raises `AssertionError` that names the first broken law.
 
-    The encoder itself is left as it is; of a plan, a copy is drawn from seed 0.
+    The encoder is not changed. Of a plan (an encoder without codebooks), a copy is drawn from seed 0.
     """
     _check(encoder, _ENCODER_LAWS)
 
 
 def check_value_encoder(encoder: ValueEncoder) -> None:
-    """Check the laws of encoders of single readings. Raises `AssertionError` naming the law that it breaks.
+    """Check the laws of value encoders. Raises `AssertionError` that names the first broken law.
 
-    The encoder itself is left as it is; of a plan, a copy is drawn from seed 0.
+    The encoder is not changed. Of a plan (an encoder without codebooks), a copy is drawn from seed 0.
     """
     _check(encoder, _VALUE_LAWS)
 
@@ -42,8 +42,8 @@ def _check(encoder: Any, laws: tuple[Callable[[Any], None], ...]) -> None:
     check(encoder, laws)
 
 
-def _inputs(encoder: _Any, seed: int = 0, observed: bool = False) -> Tensor:
-    """Readings, with both ends of the range; some are NaN where the encoder takes that, unless all are `observed`."""
+def _inputs(encoder: _AnyEncoder, seed: int = 0, observed: bool = False) -> Tensor:
+    """Random readings with both ends of the range, and with NaN if the encoder takes it, unless `observed`."""
     shape = (_ROWS, encoder.width) if isinstance(encoder, Encoder) else (_ROWS,)
     x = torch.rand(shape, generator=seeded(seed), dtype=torch.float64)
     x[0], x[1] = 0, 1
@@ -52,10 +52,10 @@ def _inputs(encoder: _Any, seed: int = 0, observed: bool = False) -> Tensor:
     return x
 
 
-def _alike(encoder: _Any, a: Tensor, b: Tensor) -> None:
-    """The same bits, or nearly so where a Fourier transform or complex numbers round in another order.
+def _alike(encoder: _AnyEncoder, a: Tensor, b: Tensor) -> None:
+    """Compare bits, or values if Fourier transforms or complex numbers may round in another order.
 
-    (Sums of unit numbers that all but cancel are scaled up again, with their rounding.)
+    Sums of unit numbers that nearly cancel are scaled up again, and their rounding with them.
     """
     if encoder.vsa.elementwise and not encoder.vsa.dtype.is_complex:
         same(a, b)
@@ -64,26 +64,23 @@ def _alike(encoder: _Any, a: Tensor, b: Tensor) -> None:
 
 
 def _made_again(encoder: Any) -> Any:
-    """A plan made of the encoder's description, which went through JSON."""
+    """A plan from the encoder's config, after a round trip through JSON."""
     return type(encoder).from_config(json.loads(json.dumps(encoder.config())), encoder.vsa)
 
 
-# -- laws of both kinds ---------------------------------------------------------------------------------------
-
-
-def _a_plan_refuses_to_encode(plan: _Any) -> None:
+def _a_plan_refuses_to_encode(plan: _AnyEncoder) -> None:
     require(not plan.drawn)
     refuses(ValueError, lambda: plan(_inputs(plan, observed=True)))
 
 
-def _an_equal_plan_draws_the_same_bits(plan: _Any) -> None:
-    drawn, again = (some.draw(seeded(3)) for some in (copy.deepcopy(plan), _made_again(plan)))
-    if again.drawn:  # else it takes tensors that are given, not drawn
+def _an_equal_plan_draws_the_same_bits(plan: _AnyEncoder) -> None:
+    drawn, again = (part.draw(seeded(3)) for part in (copy.deepcopy(plan), _made_again(plan)))
+    if again.drawn:  # else its tensors are given, not drawn
         same(again(_inputs(plan)), drawn(_inputs(plan)))
     require(not plan.drawn, "drawing a copy changed the plan")
 
 
-def _codes_have_the_type_and_dimension_of_the_architecture(encoder: _Any) -> None:
+def _codes_have_the_type_and_dimension_of_the_architecture(encoder: _AnyEncoder) -> None:
     x = _inputs(encoder)
     codes = encoder(x)
     require(codes.shape == (_ROWS, encoder.vsa.dim), f"shape {tuple(codes.shape)}")
@@ -92,12 +89,12 @@ def _codes_have_the_type_and_dimension_of_the_architecture(encoder: _Any) -> Non
     require(encoder(x[:0]).shape == (0, encoder.vsa.dim), "an empty batch does not give an empty batch")
 
 
-def _readings_of_another_float_type_have_the_same_type_of_codes(encoder: _Any) -> None:
+def _readings_of_another_float_type_have_the_same_type_of_codes(encoder: _AnyEncoder) -> None:
     x = (_inputs(encoder) * 8).round() / 8  # exact in both types
     same(encoder(x.float()), encoder(x))
 
 
-def _a_batch_is_its_singles(encoder: _Any) -> None:
+def _a_batch_is_its_singles(encoder: _AnyEncoder) -> None:
     x = _inputs(encoder)
     whole = encoder(x)
     for size in (1, 7):
@@ -105,7 +102,7 @@ def _a_batch_is_its_singles(encoder: _Any) -> None:
     _alike(encoder, encoder(x.flip(0)), whole.flip(0))
 
 
-def _equal_cells_have_equal_codes(encoder: _Any) -> None:
+def _equal_cells_have_equal_codes(encoder: _AnyEncoder) -> None:
     x = _inputs(encoder)
     cells = encoder.cells(x)
     require(cells.shape == x.shape, f"cells have the shape {tuple(cells.shape)}")
@@ -117,7 +114,7 @@ def _equal_cells_have_equal_codes(encoder: _Any) -> None:
     _alike(encoder, encoder(near)[equal], encoder(x)[equal])
 
 
-def _readings_out_of_range_are_refused(encoder: _Any) -> None:
+def _readings_out_of_range_are_refused(encoder: _AnyEncoder) -> None:
     for wrong, bound in ((-0.5, 0.0), (1.5, 1.0), (torch.inf, 1.0)):
         x = _inputs(encoder, observed=True)
         x[-1], nearest = wrong, x.clone()
@@ -126,7 +123,7 @@ def _readings_out_of_range_are_refused(encoder: _Any) -> None:
         same(encoder.cells(x), encoder.cells(nearest))
 
 
-def _the_seed_decides_the_bits(encoder: _Any) -> None:
+def _the_seed_decides_the_bits(encoder: _AnyEncoder) -> None:
     first, again, other = (_made_again(encoder).draw(seeded(seed)) for seed in (5, 5, 6))
     if first.drawn:
         x = _inputs(encoder)
@@ -134,7 +131,7 @@ def _the_seed_decides_the_bits(encoder: _Any) -> None:
         require(not torch.equal(first(x), other(x)), "another seed gives the same bits")
 
 
-def _its_description_and_tensors_make_it_again(encoder: _Any) -> None:
+def _its_description_and_tensors_make_it_again(encoder: _AnyEncoder) -> None:
     tensors = encoder.state_dict()
     layout = {name: (tensor.dtype, tuple(tensor.shape)) for name, tensor in tensors.items()}
     require(encoder.layout() == layout, f"layout() says {encoder.layout()}, state_dict() holds {layout}")
@@ -147,14 +144,14 @@ def _its_description_and_tensors_make_it_again(encoder: _Any) -> None:
     encoder.check()
 
 
-def _a_state_dict_carries_all_that_was_drawn(encoder: _Any) -> None:
+def _a_state_dict_carries_all_that_was_drawn(encoder: _AnyEncoder) -> None:
     other = _made_again(encoder).draw(seeded(7))
     if other.drawn:
         other.load_state_dict(encoder.state_dict())
         same(other(_inputs(encoder)), encoder(_inputs(encoder)))
 
 
-def _copies_answer_alike_and_are_independent(encoder: _Any) -> None:
+def _copies_answer_alike_and_are_independent(encoder: _AnyEncoder) -> None:
     x = _inputs(encoder)
     before = encoder(x)
     twin = copy.deepcopy(encoder)
@@ -178,9 +175,6 @@ _LAWS: tuple[Callable[[Any], None], ...] = (
     _a_state_dict_carries_all_that_was_drawn,
     _copies_answer_alike_and_are_independent,
 )
-
-
-# -- laws of one kind -----------------------------------------------------------------------------------------
 
 
 def _rows_have_one_column_per_reading(encoder: Encoder) -> None:

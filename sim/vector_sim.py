@@ -1,4 +1,4 @@
-"""Many robots, each alone in a world of its own, stepped together: the core of rollouts and environments."""
+"""A batch of robots, each in its own world: what rollouts and environments step."""
 
 from __future__ import annotations
 
@@ -9,22 +9,22 @@ from dataclasses import dataclass
 from types import TracebackType
 
 import numpy as np
-import pybullet
 from numpy.typing import NDArray
 
+from sim._pybullet import pybullet
 from sim.checks import real_number, real_rows, whole_number
 from sim.corral import Arena, Start, build_corral, draw_episode, find_arena
 from sim.robot import ACTUATORS, CONTROL_HZ, HEIGHT, MAX_SPEED, RADIUS, Body, Pose, find_body
 from sim.sensors import SENSOR_HEIGHT, SensorArray
 
 TOUCH = 0.005
-"""A robot touches a wall or the lamp where the gap between the outlines is at most this wide, m."""
+"""A robot touches a wall or the lamp if the gap between their outlines is at most this wide, m."""
 
 
 class World:
-    """One pybullet DIRECT client (about 29 MB) with one arena and one robot. `close` it, or use it in `with`.
+    """One pybullet DIRECT client (about 29 MB) with one arena and one robot.
 
-    A world that is dropped without that disconnects its client as well.
+    Close it, or use it as a context manager. Its client is disconnected when it is garbage collected, too.
     """
 
     def __init__(self, arena: Arena, body: str) -> None:
@@ -32,9 +32,9 @@ class World:
         _check_fit(arena)
         self.client = pybullet.connect(pybullet.DIRECT)
         if self.client < 0:
-            raise RuntimeError("pybullet has no client left for another robot; close some worlds or use fewer robots")
+            raise RuntimeError("pybullet has no client left for another robot; close worlds or use fewer robots")
         self._disconnect = weakref.finalize(self, pybullet.disconnect, self.client)
-        # At exit the process gives everything back by itself, and pybullet may be gone already.
+        # At exit the process frees everything anyway, and pybullet may be unloaded already.
         self._disconnect.atexit = False
         try:
             build_corral(arena, self.client)
@@ -44,7 +44,7 @@ class World:
             raise
 
     def close(self) -> None:
-        """Disconnect the client; closing twice is fine."""
+        """Disconnect the client. A second call does nothing."""
         self._disconnect()
         self.client = -1
 
@@ -58,9 +58,9 @@ class World:
 
 
 class WheelNoise:
-    """Factors on the two wheel speeds, one pair a control step: 1 + `wheel_noise` times a standard normal draw."""
+    """Draws a factor per wheel and control step: 1 + `wheel_noise` times a standard normal number."""
 
-    _BLOCK = 256  # drawn ahead at once; a longer episode begins like a shorter one whatever the block
+    _BLOCK = 256  # control steps drawn at once; the factors do not depend on it
 
     def __init__(self, arena: Arena, generator: np.random.Generator) -> None:
         self._arena = arena
@@ -68,7 +68,7 @@ class WheelNoise:
         self._ahead: list[list[float]] = []
 
     def draw(self) -> list[float]:
-        """Factors (left, right) for the next control step."""
+        """The factors (left, right) of the next control step."""
         if not self._ahead:
             draws = 1.0 + self._arena.wheel_noise * self._generator.standard_normal((self._BLOCK, 2))
             self._ahead = draws[::-1].tolist()
@@ -77,15 +77,15 @@ class WheelNoise:
 
 @dataclass(frozen=True)
 class State:
-    """What a batch of robots is in, one row a robot.
+    """State of a batch of robots, one row per robot.
 
     Attributes:
         x, y: `[B]`, m.
         heading: `[B]`, rad in (-pi, pi].
         sensors: `[B, 3]`, see `sim.sensors.SENSORS`.
-        contact: `[B]`, touches a wall.
-        at_lamp: `[B]`, touches the lamp.
-        outside: `[B]`, beyond the outer face of the wall with the gap, through which the only way leads.
+        contact: `[B]`, whether the robot touches a wall.
+        at_lamp: `[B]`, whether it touches the lamp.
+        outside: `[B]`, whether it is beyond the outer face of the wall with the gap.
     """
 
     x: NDArray[np.float64]
@@ -97,10 +97,10 @@ class State:
     outside: NDArray[np.bool_]
 
 
-class Fleet:
-    """`size` robots in worlds of their own: give them episodes, command them, read their state.
+class VectorSim:
+    """Simulates `size` robots, each in its own world: `reset` episodes, `drive` robots, `observe` their state.
 
-    Robots are addressed by slot. Slots are independent: what happens in one never changes a bit in another.
+    Slots 0 to `size` - 1 address the robots. They are independent: no slot changes a bit of another.
     Raises `ValueError` for an unknown arena or body, or a size below 1.
     """
 
@@ -127,7 +127,7 @@ class Fleet:
         return any(world.client < 0 for world in self.worlds)
 
     def reset(self, slot: int, episode: int) -> Start:
-        """Begin `episode` in `slot`; returns its start."""
+        """Begin `episode` in `slot` and return its start."""
         start, generator = draw_episode(self.arena, self.seed, episode)
         self._noise[slot] = WheelNoise(self.arena, generator)
         self._poses[slot] = self.worlds[slot].body.place(start)
@@ -141,7 +141,7 @@ class Fleet:
             self._poses[slot] = self.worlds[slot].body.drive(left * left_factor, right * right_factor)
 
     def observe(self, slots: Sequence[int]) -> State:
-        """The state of the robots in `slots`, in that order."""
+        """The state of the robots in `slots`, in this order."""
         poses = [self._poses[slot] for slot in slots]
         x, y, cos, sin = np.array(poses).T
         dx = np.maximum(np.abs(x[:, None] - self._walls[:, 0]) - self._walls[:, 2], 0.0)
@@ -160,11 +160,11 @@ class Fleet:
         )
 
     def close(self) -> None:
-        """Disconnect all clients; closing twice is fine."""
+        """Disconnect all clients. A second call does nothing."""
         for world in self.worlds:
             world.close()
 
-    def __enter__(self) -> Fleet:
+    def __enter__(self) -> VectorSim:
         return self
 
     def __exit__(
@@ -175,16 +175,17 @@ class Fleet:
 
 def _check_fit(arena: Arena) -> None:
     if arena.gap <= 2 * RADIUS:
-        raise ValueError(f"Arena.gap is {arena.gap} m; the robot is {2 * RADIUS} m wide and needs more to get out")
+        raise ValueError(f"Arena.gap is {arena.gap} m; it must be wider than the robot, {2 * RADIUS} m")
     if not HEIGHT < arena.lamp_height < SENSOR_HEIGHT < arena.wall_height:
         raise ValueError(
             f"Arena.lamp_height is {arena.lamp_height} m and wall_height {arena.wall_height} m; the lamp must be "
-            f"higher than the robot's centre ({HEIGHT} m) and lower than its beams ({SENSOR_HEIGHT} m), walls higher"
+            f"higher than the robot's centre ({HEIGHT} m) and lower than its beams ({SENSOR_HEIGHT} m), and the "
+            "walls higher than the beams"
         )
 
 
 def control_steps(seconds: float) -> int:
-    """Number of control steps in `seconds`. Raises `ValueError` unless there is at least one."""
+    """The number of control steps in `seconds`. Raises `ValueError` unless it is at least 1."""
     seconds = real_number("time", seconds)
     steps = round(seconds * CONTROL_HZ) if math.isfinite(seconds * CONTROL_HZ) else 0
     if steps < 1:
@@ -193,7 +194,7 @@ def control_steps(seconds: float) -> int:
 
 
 def check_commands(commands: object, batch: int) -> NDArray[np.float64]:
-    """`commands` as float64 `[batch, 2]`. Raises `ValueError` for another shape, complex numbers and text."""
+    """`commands` as float64 `[batch, 2]`. Raises `ValueError` for other shapes, complex numbers and text."""
     array = real_rows("commands", commands)
     if array.shape != (batch, len(ACTUATORS)):
         raise ValueError(f"commands have shape {array.shape}; expected {(batch, len(ACTUATORS))} (left, right wheel)")
