@@ -12,9 +12,9 @@ from torch import Tensor, nn
 from behaviours.algebra import described, terms_from
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient, Rule, check_rule
-from behaviours.progress import Progress, silent
-from behaviours.recall import Recall, asked_once
+from behaviours.learning import Gradient, Rule, require_rule
+from behaviours.progress import Progress, no_progress
+from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from behaviours.storage import Layout, check_layout, load_tensors, naming, save_tensors
@@ -35,7 +35,7 @@ class BehaviourBank(nn.Module):
         self._behaviours = nn.ModuleList()
 
     def learn(
-        self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = silent
+        self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = no_progress
     ) -> LearningReport:
         """Learn a behaviour (with `Gradient()`, if no rule is given) and keep it under `name`.
 
@@ -44,20 +44,20 @@ class BehaviourBank(nn.Module):
         """
         check_name(name)
         rule = Gradient() if rule is None else rule
-        check_rule(rule)
+        require_rule(rule)
         behaviour = rule.fit(self.space, demonstrations, progress)
         self.add(name, behaviour)
         return behaviour.report
 
     def partial_fit(
-        self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = silent
+        self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = no_progress
     ) -> LearningReport:
         """Go on learning the behaviour `name` from a further piece of demonstration, or begin it with its first.
 
         Says what became of all pieces so far. `progress` is called with the share of the work that is done. Raises
         `ValueError` for rules that cannot go on, see `Rule.partial_fit`.
         """
-        check_rule(rule)
+        require_rule(rule)
         if name not in self:
             return self.learn(name, demonstrations, rule, progress)
         behaviour = rule.partial_fit(self[name], demonstrations, progress)
@@ -104,16 +104,16 @@ class BehaviourBank(nn.Module):
         """What every behaviour answers to cells as `Space.cells` returns them."""
         if not len(self):
             return {}
-        recall = asked_once(partial(by_blocks, self._ask_all, row_bytes=8 * self.space.vsa.dim), cells)
+        recall = over_unique_rows(partial(by_blocks, self._query_all, row_bytes=8 * self.space.vsa.dim), cells)
         blind = (cells < 0).all(-1)
         commands, similarity, margin, familiarity, _ = recall
         # One behaviour after the other, in the second dimension.
         columns = zip(*(field.unbind(1) for field in (commands, similarity, margin, familiarity)), strict=True)
-        return {name: Recall(*column).blank(blind) for name, column in zip(self, columns, strict=True)}
+        return {name: Recall(*column).mask_unobserved(blind) for name, column in zip(self, columns, strict=True)}
 
-    def _ask_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
+    def _query_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         conditions = self.space.encode(cells)
-        answers = [self[name].ask(conditions) for name in self]
+        answers = [self[name].query(conditions) for name in self]
         return Recall(*(torch.stack([getattr(answer, f) for answer in answers], 1) for f in Recall._fields[:4]))
 
     # -- as a mapping -------------------------------------------------------------------------------------

@@ -157,7 +157,7 @@ class Behaviour(Controller):
             row_bytes=8 * self.space.vsa.dim,
         )
 
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """Answer conditions that are encoded and protected already (Algorithm 2, lines 2 to 8)."""
         return recalled(self.readout(), self.known, self.memory.commands, conditions)
 

@@ -7,7 +7,7 @@ from typing import Any
 from jaxtyping import Shaped
 from torch import Tensor, nn
 
-from behaviours.recall import Recall, asked_once
+from behaviours.recall import Recall, over_unique_rows
 from behaviours.space import Space
 
 
@@ -45,7 +45,7 @@ class Controller(nn.Module, ABC):
 
     def answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         """Commands for cells as `Space.cells` returns them; NaN commands where no sensor was observed."""
-        return asked_once(self._answer, cells).blank((cells < 0).all(-1))
+        return over_unique_rows(self._answer, cells).mask_unobserved((cells < 0).all(-1))
 
     @abstractmethod
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:

@@ -19,7 +19,7 @@ from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import Gradient, no_convergence_warnings
 from behaviours.learning.least_squares import solve
-from behaviours.progress import between
+from behaviours.progress import subrange
 from behaviours.quantiles import QuantileEncoding
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator
@@ -40,7 +40,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     | `dim` | elements of the program |
     | `bins` | quantile bins per feature, at most; their edges take features · bins floats |
     | `subset` | most features that interact in one dimension |
-    | `passes`, `batch`, `learning_rate` | of the gradient descent |
+    | `epochs`, `batch_size`, `learning_rate` | of the gradient descent |
     | `random_state` | seeds codebooks and batches |
     | `verbose` | 1 prints now and then which share of the training is done |
 
@@ -56,8 +56,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         *,
         bins: int = 4096,
         subset: int = 2,
-        passes: int = 100,
-        batch: int = 128,
+        epochs: int = 100,
+        batch_size: int = 128,
         learning_rate: float = 0.05,
         random_state: Any = None,
         verbose: int = 0,
@@ -65,8 +65,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         self.dim = dim
         self.bins = bins
         self.subset = subset
-        self.passes = passes
-        self.batch = batch
+        self.epochs = epochs
+        self.batch_size = batch_size
         self.learning_rate = learning_rate
         self.random_state = random_state
         self.verbose = verbose
@@ -97,8 +97,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         """Go on training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
 
         The edges of the bins come from the first batch: it should span the readings to come, since
-        values beyond it count as the nearest of them. Each call goes `passes` times through its own rows, and nothing
-        else reminds the program of earlier ones: with batches of one class each, take few passes.
+        values beyond it count as the nearest of them. Each call goes `epochs` times through its own rows, and nothing
+        else reminds the program of earlier ones: with batches of one class each, take few epochs.
 
         Raises `ValueError` for labels that are none of `classes`, and as `fit` does.
         """
@@ -128,8 +128,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
 
     def _check_parameters(self) -> None:
         super()._check_parameters()
-        self._whole("passes")
-        self._whole("batch")
+        self._whole("epochs")
+        self._whole("batch_size")
         if self._positive("learning_rate") > 1e30:
             # The program is float32, and so are its steps.
             raise ValueError(f"learning_rate must be a number of float32, at most 1e30; got {self.learning_rate!r}")
@@ -139,15 +139,15 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         return self._space(readings, [Actuator("class", 0, count - 1, levels=count)])
 
     def _rule(self, seed: int) -> Gradient:
-        passes, batch, rate = self._whole("passes"), self._whole("batch"), self._positive("learning_rate")
-        return Gradient(passes=passes, batch=batch, learning_rate=rate, sparse=True, seed=seed)
+        epochs, batch_size, rate = self._whole("epochs"), self._whole("batch_size"), self._positive("learning_rate")
+        return Gradient(epochs=epochs, batch_size=batch_size, learning_rate=rate, sparse=True, seed=seed)
 
     def _blank(self, space: Space) -> Behaviour:
         """The behaviour that knows all classes and no condition."""
         zeros = torch.zeros(space.vsa.dim)
         known = zeros.to(space.vsa.accumulator)
         levels = torch.arange(len(self.classes_))[:, None]
-        return Behaviour(space, zeros, known, levels, LearningReport(Gradient.name, samples=0, new=0, passes=0))
+        return Behaviour(space, zeros, known, levels, LearningReport(Gradient.name, samples=0, new=0, epochs=0))
 
     def _scores(self, X: Any) -> Float64[np.ndarray, "N K"]:  # noqa: N803
         check_is_fitted(self)
@@ -227,7 +227,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
             actuators = [Actuator(f"y{i}", -1, 1, levels=2) for i in range(targets.shape[1])]
             self.space_ = self._space(readings, actuators)
             progress = self._progress()
-            conditions = torch.cat(self._conditions(self.space_, readings, between(progress, 0, 0.5)))
+            conditions = torch.cat(self._conditions(self.space_, readings, subrange(progress, 0, 0.5)))
             self.program_ = self._solved(conditions, torch.from_numpy(targets), ridge)
             progress(1.0)
         return self
@@ -237,7 +237,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
     ) -> Shaped[Tensor, "d"]:
         """The program of the ridge problem; raises `ValueError` where `ridge` leaves it without a solution."""
         try:
-            program = solve(self.space_.vsa, conditions, self.space_.results.roles, targets, ridge)
+            program = solve(self.space_.vsa, conditions, self.space_.result_encoder.roles, targets, ridge)
         except torch.linalg.LinAlgError as error:  # pyright: ignore[reportPrivateImportUsage]
             raise ValueError(f"ridge={ridge} leaves the system of these rows singular; take a larger one") from error
         if not program.isfinite().all():
@@ -248,7 +248,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
         """The values that the program answers, `[N]` or `[N, m]` as in `fit`."""
         check_is_fitted(self)
         readings = self._checked(X, reset=False)
-        readout = self.space_.vsa.readout(self.program_.double(), self.space_.results.roles)
+        readout = self.space_.vsa.readout(self.program_.double(), self.space_.result_encoder.roles)
         scores = torch.cat([readout(block) for block in self._conditions(self.space_, readings)])
         # A product with a role, not with a role of length 1.
         answers = scores * readout.lengths

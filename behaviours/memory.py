@@ -52,7 +52,7 @@ class ResultMemory(nn.Module):
 
     def _sources(self) -> tuple[Tensor, ...]:
         (space,) = self._space
-        return self.levels, *space.results.state_dict().values()
+        return self.levels, *space.result_encoder.state_dict().values()
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "ResultMemory":
         # Commands stay in float64, and go with the levels to another device.
@@ -98,7 +98,7 @@ def decode(space: Space, levels: Int64[Tensor, "k m"], items: Shaped[Tensor, "k 
     columns = []
     for actuator in range(levels.shape[1]):
         stored = in_order_of_appearance(levels[:, actuator])
-        values = CleanUp(space.results.value.encode(stored))
-        noisy = space.vsa.unbind(items, space.results.roles[actuator])
+        values = CleanUp(space.result_encoder.value.encode(stored))
+        noisy = space.vsa.unbind(items, space.result_encoder.roles[actuator])
         columns.append(stored[values(noisy).index])
     return space.schema.command_values(torch.stack(columns, -1))

@@ -82,9 +82,9 @@ class Sensor:
         Sensor("gear", kind="categorical", values=("low", "high", "reverse"))
 
     `values` are all text, or all numbers. Numbers are read as they are. Text is read as text, or as its index in
-    `values` (0 for the first one): tensors hold numbers only. `beyond` says what becomes of a real reading outside the
-    range: an error, or the nearest bound. Of binary and categorical sensors `low` and `high` are the least and the
-    greatest number that they read.
+    `values` (0 for the first one): tensors hold numbers only. A real reading outside the range is an error
+    (`out_of_range="error"`) or becomes the nearest bound (`"clip"`). For binary and categorical sensors `low` and
+    `high` are the least and the greatest number that they read.
 
     Raises `ValueError`, naming the sensor, for what makes no sense.
     """
@@ -93,7 +93,7 @@ class Sensor:
     low: float = math.nan
     high: float = math.nan
     unit: str = ""
-    beyond: Literal["error", "clip"] = "error"
+    out_of_range: Literal["error", "clip"] = "error"
     kind: Literal["real", "angle", "binary", "categorical"] = "real"
     values: Sequence[str] | Sequence[float] = ()
 
@@ -103,10 +103,12 @@ class Sensor:
             raise ValueError(
                 f"sensor {self.name!r}: kind is 'real', 'angle', 'binary' or 'categorical'; got {self.kind!r}"
             )
-        if self.beyond not in ("error", "clip"):
-            raise ValueError(f"sensor {self.name!r}: beyond is 'error' or 'clip'; got {self.beyond!r}")
-        if self.kind != "real" and self.beyond != "error":
-            raise ValueError(f"sensor {self.name!r}: only real sensors have a nearest bound, beyond={self.beyond!r}")
+        if self.out_of_range not in ("error", "clip"):
+            raise ValueError(f"sensor {self.name!r}: out_of_range is 'error' or 'clip'; got {self.out_of_range!r}")
+        if self.kind != "real" and self.out_of_range != "error":
+            raise ValueError(
+                f"sensor {self.name!r}: only real sensors have a nearest bound, out_of_range={self.out_of_range!r}"
+            )
         object.__setattr__(self, "values", self._checked_values())
         if self.choices:
             self._take_range(min(self.choices), max(self.choices))

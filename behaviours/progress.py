@@ -6,10 +6,10 @@ Progress = Callable[[float], object]
 """Called with the share of the work that is done, from 0 to 1, now and then and at its end."""
 
 
-def silent(share: float) -> None:
+def no_progress(share: float) -> None:
     """Tell nobody."""
 
 
-def between(progress: Progress, low: float, high: float) -> Progress:
+def subrange(progress: Progress, low: float, high: float) -> Progress:
     """The progress of a part of the work, which takes it from `low` to `high`."""
     return lambda share: progress(low + (high - low) * share)

@@ -17,7 +17,7 @@ from sklearn.utils.validation import validate_data
 from torch import Tensor
 
 from behaviours.edges import quantile_edges
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Space
 from torchvsa import MAP
@@ -92,7 +92,7 @@ class QuantileEncoding(BaseEstimator):
     def _progress(self) -> Progress:
         """Prints the share of the work that is done, at each further tenth, if `verbose` asks for it."""
         if not self._whole("verbose", 0):
-            return silent
+            return no_progress
         printed = -1
 
         def show(share: float) -> None:
@@ -119,7 +119,7 @@ class QuantileEncoding(BaseEstimator):
             seen = column[~column.isnan()]
             low, high = (seen.min().item(), seen.max().item()) if len(seen) else (0.0, 0.0)
             low, high = (low, high) if low < high else _around(low)
-            sensors.append(Sensor(str(name), low, high, beyond="clip"))
+            sensors.append(Sensor(str(name), low, high, out_of_range="clip"))
             edges.append((quantile_edges(seen, bins) - low) / (high - low))
         vsa = MAP(self._whole("dim"), dtype=torch.int8)
         encoder = ThresholdFeatures(vsa, features, bins, self._whole("subset"), edges)
@@ -127,7 +127,7 @@ class QuantileEncoding(BaseEstimator):
         return Space(Schema(sensors, actuators), encoder, seed=seed, command_codes=codes)
 
     def _conditions(
-        self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = silent
+        self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = no_progress
     ) -> list[Shaped[Tensor, "batch d"]]:
         """The encoded rows, some at a time; raises for rows in which nothing was observed."""
         blind = np.isnan(readings).all(1)

@@ -31,7 +31,7 @@ class Recall(NamedTuple):
         spoken = None if self.speaker is None else self.speaker[which]
         return Recall(self.commands[which], self.similarity[which], self.margin[which], self.familiarity[which], spoken)
 
-    def blank(self, rows: Any) -> "Recall":
+    def mask_unobserved(self, rows: Any) -> "Recall":
         """Answer nothing in the given rows: NaN commands; similarity, margin and familiarity 0; speaker -1."""
         return Recall(
             self.commands.masked_fill(rows[:, None], torch.nan),
@@ -46,7 +46,7 @@ _MANY = 128
 """Rows from which on it pays to find equal ones."""
 
 
-def asked_once(answer: Callable[[Shaped[Tensor, "some w"]], Recall], cells: Shaped[Tensor, "batch w"]) -> Recall:
+def over_unique_rows(answer: Callable[[Shaped[Tensor, "some w"]], Recall], cells: Shaped[Tensor, "batch w"]) -> Recall:
     """`answer(cells)`, asking once about rows that are equal: what a robot reads in a while falls into few cells.
 
     A graph and a GPU ask about every row, since how many differ is known only from the values.

@@ -25,7 +25,7 @@ class LearningReport:
     """Samples stored once more, since the memory had forgotten their condition."""
     contradicting: int = 0
     """Samples whose condition was stored before with another result."""
-    passes: int = 1
+    epochs: int = 1
     """How often the rule went through the pairs."""
     updates: int = 0
     """How often a trained program was corrected."""
@@ -52,7 +52,7 @@ class LearningReport:
         """Pairs of condition and result added to the program, repetitions included."""
         return self.new + self.re_added
 
-    def then(self, later: "LearningReport") -> "LearningReport":
+    def merged(self, later: "LearningReport") -> "LearningReport":
         """The report of two pieces of demonstration: counts add up; `wrong` is known of the later one only."""
         counts: dict[str, Any] = {key: value + getattr(later, key) for key, value in self._counts().items()}
         counts["wrong"] = later.wrong

@@ -119,7 +119,7 @@ class Schema:
 
     def _refuse(self, rows: Tensor, wrong: Tensor) -> None:
         """Raise if a reading is infinite, or `wrong` and its sensor does not clip."""
-        strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
+        strict = torch.tensor([s.out_of_range == "error" for s in self.sensors], device=rows.device)
         wrong = rows.isinf() | (wrong & strict)
         if wrong.any():
             row, column = wrong.nonzero()[0].tolist()
@@ -128,7 +128,7 @@ class Schema:
             clips = sensor.kind == "real" and not np.isinf(value)
             raise ValueError(
                 f"sensor {sensor.name!r} reads {value:g} in row {row}; {sensor.described()}"
-                + (" (declare it with beyond='clip' to accept the nearest bound)" if clips else "")
+                + (" (declare it with out_of_range='clip' to accept the nearest bound)" if clips else "")
             )
 
     def _without_text(self, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:

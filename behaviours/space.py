@@ -56,14 +56,14 @@ class Space(nn.Module):
         check_value_bins(schema, encoder)
         self.vsa = encoder.vsa
         most = max(actuator.levels for actuator in actuators)
-        results = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
-        if results.bins != most:
-            raise ValueError(f"the codes of commands are for {results.bins} levels; the schema has {most}")
+        result_encoder = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
+        if result_encoder.bins != most:
+            raise ValueError(f"the codes of commands are for {result_encoder.bins} levels; the schema has {most}")
         protection = protection or Unprotected(self.vsa)
         generator = torch.Generator().manual_seed(self.seed)
         self.encoder = _drawn(encoder, self.vsa, generator)
         check_told_apart(schema, self.encoder)
-        self.results = _drawn(results, self.vsa, generator)
+        self.result_encoder = _drawn(result_encoder, self.vsa, generator)
         self.protect = _drawn(protection, self.vsa, generator)
 
     # -- readings ---------------------------------------------------------------------------------------
@@ -102,12 +102,12 @@ class Space(nn.Module):
 
     def items(self, levels: Int64[Tensor, "k m"]) -> Shaped[Tensor, "k d"]:
         """The hypervector of each result, a row of one level per actuator."""
-        return self.results.encode(levels)
+        return self.result_encoder.encode(levels)
 
     @property
     def device(self) -> torch.device:
         """Where the codebooks are."""
-        return self.results.roles.device
+        return self.result_encoder.roles.device
 
     # -- the space as a value ---------------------------------------------------------------------------
 
@@ -117,7 +117,7 @@ class Space(nn.Module):
             "schema": self.schema.to_dict(),
             "vsa": self.vsa.config(),
             "encoder": self.encoder.config(),
-            "command_codes": self.results.value.config(),
+            "command_codes": self.result_encoder.value.config(),
             "protection": self.protect.config(),
             "seed": self.seed,
         }
@@ -153,9 +153,9 @@ class Space(nn.Module):
                 start = f"{name}."
                 with naming(name):
                     part.take({key.removeprefix(start): t for key, t in codebooks.items() if key.startswith(start)})
-        results: Any = parts["results"]
-        space = cls(schema, parts["encoder"], vsa, parts["protect"], config["seed"], results.value)  # type: ignore[arg-type]
-        space.results = results if results.drawn else space.results
+        result_encoder: Any = parts["result_encoder"]
+        space = cls(schema, parts["encoder"], vsa, parts["protect"], config["seed"], result_encoder.value)  # type: ignore[arg-type]
+        space.result_encoder = result_encoder if result_encoder.drawn else space.result_encoder
         return space
 
 
@@ -174,7 +174,7 @@ def _plans(config: Mapping[str, Any]) -> tuple[Schema, VSA, dict[str, Part]]:
         parts["encoder"] = torchvsa.encoders.encoder(config["encoder"], vsa)
     with naming("command_codes"):
         values = torchvsa.encoders.value_encoder(config["command_codes"], vsa)
-        parts["results"] = Sum(values, sensors=len(schema.actuators))
+        parts["result_encoder"] = Sum(values, sensors=len(schema.actuators))
     with naming("protection"):
         parts["protect"] = torchvsa.protection(config["protection"], vsa)
     return schema, vsa, parts

@@ -37,7 +37,7 @@ def space(vsa: VSA, seed: int) -> Space:
     thresholds = (LIGHT_MAX, LIGHT_MAX, OBSTACLE)
     sensors = [
         # The reading at a light sensor's maximum is the first that counts as dark.
-        Sensor(name, 0.0, 2 * threshold, unit, beyond="clip")
+        Sensor(name, 0.0, 2 * threshold, unit, out_of_range="clip")
         for (name, _, _, unit), threshold in zip(sim.SENSORS, thresholds, strict=True)
     ]
     schema = Schema(sensors, learners_schema().actuators)

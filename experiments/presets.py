@@ -17,10 +17,10 @@ COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
 
 
-def schema(beyond: Literal["error", "clip"] = "clip") -> Schema:
+def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
     """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
     return Schema(
-        [Sensor(name, low, high, unit, beyond) for name, low, high, unit in sim.SENSORS],
+        [Sensor(name, low, high, unit, out_of_range) for name, low, high, unit in sim.SENSORS],
         [Actuator(name, low, high, unit, levels=COMMAND_LEVELS) for name, low, high, unit in sim.ACTUATORS],
     )
 

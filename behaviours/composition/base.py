@@ -20,8 +20,8 @@ class Policy(Controller):
 
     `names` says which behaviours take part; `Recall.speaker` counts within it. A policy is a snapshot: it holds the
     behaviours that the bank had when the policy was made, and what the bank learns later does not change it. A new
-    policy implements `ask` and is registered in `behaviours.composition.POLICIES`; one with a memory implements `start`
-    and `step` as well.
+    policy implements `query` and is registered in `behaviours.composition.POLICIES`; one with a memory also
+    implements `start` and `step`.
     """
 
     def __init__(self, bank: BehaviourBank, names: list[str]) -> None:
@@ -41,10 +41,10 @@ class Policy(Controller):
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         # Some rows at a time: the conditions of all need not be held.
-        return by_blocks(lambda rows: self.ask(self.space.encode(rows)), cells, row_bytes=self.space.vsa.row_bytes)
+        return by_blocks(lambda rows: self.query(self.space.encode(rows)), cells, row_bytes=self.space.vsa.row_bytes)
 
     @abstractmethod
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """Answer conditions that are encoded and protected already."""
 
     def per_behaviour(self, given: Mapping[str, float] | None, otherwise: Sequence[float], what: str) -> list[float]:

@@ -44,12 +44,12 @@ class Bundle(Policy):
         """The weighted sum of the programs."""
         return self.behaviour.program
 
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """See `Policy.ask`."""
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+        """See `Policy.query`."""
         scores = self.behaviour.readout()(conditions)
         # The score of the sum is the weighted sum of the scores that the behaviours give.
         parts = self.behaviour.readout().of(stacked([part.program for part in self.parts]))(conditions)
         weights = torch.tensor(self.weights, dtype=torch.float64, device=scores.device)
         winner = scores.argmax(-1)[:, None, None].expand(-1, len(weights), 1)
         shares = (weights * parts.gather(-1, winner)[..., 0]).masked_fill(weights == 0, -torch.inf)
-        return self.behaviour.ask(conditions)._replace(speaker=shares.argmax(-1))
+        return self.behaviour.query(conditions)._replace(speaker=shares.argmax(-1))

@@ -32,9 +32,9 @@ class Priority(Policy):
         calibrated = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
         self.thresholds = self.per_behaviour(thresholds, calibrated, "thresholds")
 
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """See `Policy.ask`."""
-        answers = [part.ask(conditions) for part in self.parts]
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+        """See `Policy.query`."""
+        answers = [part.query(conditions) for part in self.parts]
         familiarity = torch.stack([recall.familiarity for recall in answers])
         knows = familiarity > torch.tensor(self.thresholds, device=familiarity.device)[:, None]
         speaker = torch.where(knows.any(0), knows.to(torch.int8).argmax(0), familiarity.argmax(0))

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 from behaviours.demonstrations import Demonstrations
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import as_bipolar
@@ -17,10 +17,10 @@ class Rule(ABC):
     """Turns a demonstration into a behaviour. A new rule is one class, registered in `behaviours.learning.RULES`."""
 
     name: ClassVar[str]
-    counts: ClassVar[bool] = True
+    integer_programs: ClassVar[bool] = True
     """Whether programs are sums of pairs, integers for integer codes; else they are always floats."""
 
-    incremental: ClassVar[bool] = False
+    supports_partial_fit: ClassVar[bool] = False
     """Whether it can go on from a behaviour with some of its options, see `partial_fit`."""
 
     @classmethod
@@ -29,7 +29,7 @@ class Rule(ABC):
         return True
 
     @abstractmethod
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> "Behaviour":
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> "Behaviour":
         """Learn one program from the demonstration. Raises for readings or commands that are not valid.
 
         `progress` is called with the share of the work that is done, see `behaviours.progress`. Rules that train warn
@@ -38,7 +38,7 @@ class Rule(ABC):
         """
 
     def partial_fit(
-        self, behaviour: "Behaviour", demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: "Behaviour", demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> "Behaviour":
         """Go on learning: what becomes of `behaviour`, whichever rule it is from, when this is shown as well.
 
@@ -52,9 +52,9 @@ class Rule(ABC):
         raise ValueError(f"{self.name!r} cannot go on from a behaviour; show all demonstrations at once, to fit")
 
 
-def grown(before: "Behaviour | None", piece: "Behaviour") -> "Behaviour":
+def continued(before: "Behaviour | None", piece: "Behaviour") -> "Behaviour":
     """`piece`, whose known conditions and report take in those of the behaviour `before` it."""
     if before is not None:
         piece.known = piece.known + as_bipolar(before.known)
-        piece.report = before.report.then(piece.report)
+        piece.report = before.report.merged(piece.report)
     return piece

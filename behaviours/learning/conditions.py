@@ -8,7 +8,7 @@ from jaxtyping import Int64, Shaped
 from torch import Tensor
 
 from behaviours.ordered import distinct_rows, first_rows
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.space import Space
 from torchvsa._numerics import inner_products, real_parts
 
@@ -20,7 +20,7 @@ _PRINTS = 8
 """Numbers in a fingerprint."""
 
 
-class Conditions:
+class LazyConditions:
     """`k` conditions of which the cells alone are held; indexed like a tensor `[k, d]`, it encodes what is asked for.
 
     A million conditions of d = 4,000 bytes would take 4 GB, their cells a twentieth of it.
@@ -51,8 +51,8 @@ class Conditions:
 
 
 def encode_distinct(
-    space: Space, cells: Shaped[Tensor, "N w"], progress: Progress = silent
-) -> tuple["Shaped[Tensor, 'k d'] | Conditions", Int64[Tensor, "N"]]:
+    space: Space, cells: Shaped[Tensor, "N w"], progress: Progress = no_progress
+) -> tuple["Shaped[Tensor, 'k d'] | LazyConditions", Int64[Tensor, "N"]]:
     """The distinct conditions of these rows, in order of first appearance, and which of them each row has.
 
     Conditions are the same if their hypervectors are. Rows of equal cells are found first, and only one of each is
@@ -64,7 +64,7 @@ def encode_distinct(
         progress(1.0)
         return encoded, merged[condition]
     first, merged = _merged(space, distinct, progress)
-    return Conditions(space, distinct if len(first) == len(distinct) else distinct[first]), merged[condition]
+    return LazyConditions(space, distinct if len(first) == len(distinct) else distinct[first]), merged[condition]
 
 
 def _merged(

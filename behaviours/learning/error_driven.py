@@ -11,12 +11,12 @@ from torch import Tensor
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning.base import Rule, grown
-from behaviours.learning.conditions import Conditions
+from behaviours.learning.base import Rule, continued
+from behaviours.learning.conditions import LazyConditions
 from behaviours.learning.convergence import warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import flag, number, store, whole
-from behaviours.progress import Progress, between, silent
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import as_bipolar, is_integer, norms
@@ -36,11 +36,11 @@ class ErrorDriven(Rule):
     program over all visits of pairs instead, which does not hang on the last corrections: a float vector, and pairs
     that are in order at the end need not be so in the mean.
 
-    Training ends when all pairs are in order, after `passes`, or early where it would not get there: once the
-    corrections of the last `patience` passes, compared with those of the `patience` passes before, fall so slowly that
-    in the last of `passes` about a third of the pairs would still be corrected. It then returns, of the programs
-    at the end of the last `patience` passes, the one that recalls the fewest pairs wrongly. (A run that ends at
-    `passes` returns its last program; `patience` of more than half of `passes` never ends a run early.)
+    Training ends when all pairs are in order, after `epochs`, or early where it would not get there: once the
+    corrections of the last `patience` epochs, compared with those of the `patience` epochs before, fall so slowly that
+    in the last of `epochs` about a third of the pairs would still be corrected. It then returns, of the programs
+    at the end of the last `patience` epochs, the one that recalls the fewest pairs wrongly. (A run that ends at
+    `epochs` returns its last program; `patience` of more than half of `epochs` never ends a run early.)
 
     `contradictions` decides for a condition shown with several results: the `"first"` (as the paper does),
     the `"majority"` (the first among equals), or the `"latest"`.
@@ -50,10 +50,10 @@ class ErrorDriven(Rule):
     """
 
     name = "error_driven"
-    incremental = True
+    supports_partial_fit = True
 
     margin: float = 0.5
-    passes: int = 200
+    epochs: int = 200
     contradictions: Contradictions = "majority"
     average: bool = False
     patience: int = 30
@@ -63,25 +63,25 @@ class ErrorDriven(Rule):
         store(
             self,
             margin=number("margin", self.margin, 0),
-            passes=whole("passes", self.passes, 1),
+            epochs=whole("epochs", self.epochs, 1),
             average=flag("average", self.average),
             patience=whole("patience", self.patience, 1),
         )
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """See `Rule.fit`."""
-        samples = Samples.of(space, demonstrations, between(progress, 0, _ENCODED))
+        samples = Samples.of(space, demonstrations, subrange(progress, 0, _ENCODED))
         return self._learn(space, samples, None, progress)
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         """See `Rule.partial_fit`: the pairs of this piece are set right, from the program at hand on.
 
         Earlier pairs are not visited again, and later corrections may disturb them.
         """
-        samples = Samples.of(behaviour.space, demonstrations, between(progress, 0, _ENCODED))
-        return self._learn(behaviour.space, samples.after(behaviour.results), behaviour, progress)
+        samples = Samples.of(behaviour.space, demonstrations, subrange(progress, 0, _ENCODED))
+        return self._learn(behaviour.space, samples.with_known_results(behaviour.results), behaviour, progress)
 
     def _learn(self, space: Space, samples: Samples, before: Behaviour | None, progress: Progress) -> Behaviour:
         targets = samples.targets(self.contradictions)
@@ -89,16 +89,16 @@ class ErrorDriven(Rule):
         start = torch.zeros(space.vsa.dim, dtype=space.vsa.accumulator, device=targets.device)
         if before is not None:
             start = start + as_bipolar(before.program).detach()
-        trained = self._train(pairs, start, between(progress, _ENCODED, 1))
+        trained = self._train(pairs, start, subrange(progress, _ENCODED, 1))
         progress(1.0)
         report = samples.report(
             self.name,
             contradicting=int((targets[samples.condition] != samples.result).sum()),
-            passes=trained.passes,
+            epochs=trained.epochs,
             updates=trained.updates,
             wrong=trained.short,
         )
-        ended_early = trained.passes < self.passes
+        ended_early = trained.epochs < self.epochs
         below = f" and {trained.short - trained.wrong} more below the margin" if trained.short > trained.wrong else ""
         warn_if_wrong(
             type(self).__name__,
@@ -106,10 +106,10 @@ class ErrorDriven(Rule):
             len(targets),
             contradicting=report.contradicting,
             samples=report.samples,
-            after=f"{below} after {trained.passes} passes",
-            remedy="more dimensions (dim)" if ended_early else "more dimensions (dim) or passes",
+            after=f"{below} after {trained.epochs} epochs",
+            remedy="more dimensions (dim)" if ended_early else "more dimensions (dim) or epochs",
         )
-        return grown(before, Behaviour(space, trained.program, samples.known(space.vsa), samples.results, report))
+        return continued(before, Behaviour(space, trained.program, samples.known(space.vsa), samples.results, report))
 
     def _train(self, pairs: "_Pairs", program: Shaped[Tensor, "d"], progress: Progress) -> "_Trained":
         """The sequential perceptron: the pairs are visited in order, and each sees all corrections before it."""
@@ -120,7 +120,7 @@ class ErrorDriven(Rule):
         visits = told = 0
         hopeless = False
         exact = pairs.vsa.integer and is_integer(program)
-        while len(corrections) < self.passes:
+        while len(corrections) < self.epochs:
             corrected = start = 0
             size = _BLOCK
             while start < len(pairs):
@@ -129,7 +129,7 @@ class ErrorDriven(Rule):
                 short, rivals, rival_scores = pairs.judge(program, start, size)
                 if visits + start - told >= _TOLD:
                     told = visits + start
-                    progress(told / (self.passes * len(pairs)))
+                    progress(told / (self.epochs * len(pairs)))
                 if not short.any():
                     start += size
                     size = min(2 * size, _BLOCK)
@@ -149,29 +149,29 @@ class ErrorDriven(Rule):
             visits += len(pairs)
             corrections.append(corrected)
             ends.append(program)
-            hopeless = _hopeless(corrections, len(pairs), self.patience, self.passes)
+            hopeless = _hopeless(corrections, len(pairs), self.patience, self.epochs)
             if corrected == 0 or hopeless:
                 break
-            progress(visits / (self.passes * len(pairs)))
-        passes, updates = len(corrections), sum(corrections)
+            progress(visits / (self.epochs * len(pairs)))
+        epochs, updates = len(corrections), sum(corrections)
         if self.average:
             mean = (program.to(late.dtype) * visits - late) / torch.tensor(visits, dtype=torch.float64)
             ends = deque([mean.to(torch.float32 if pairs.vsa.integer else pairs.vsa.dtype)])
         elif corrections[-1] == 0:
-            return _Trained(program, passes, updates, 0, 0)
+            return _Trained(program, epochs, updates, 0, 0)
         elif not hopeless:
             ends = deque([program])
         # Each correction changes the recall of all pairs, so what is left wrong is only known by asking again.
         outcomes = [pairs.outcome(end) for end in ends]
         best = min(range(len(ends)), key=outcomes.__getitem__)
-        return _Trained(ends[best], passes, updates, *outcomes[best])
+        return _Trained(ends[best], epochs, updates, *outcomes[best])
 
 
 class _Trained(NamedTuple):
     """What a training ended with."""
 
     program: Shaped[Tensor, "d"]
-    passes: int
+    epochs: int
     updates: int
     wrong: int
     """Pairs recalled wrongly."""
@@ -185,7 +185,7 @@ class _Pairs:
     def __init__(
         self,
         vsa: VSA,
-        conditions: Shaped[Tensor, "k d"] | Conditions,
+        conditions: Shaped[Tensor, "k d"] | LazyConditions,
         targets: Int64[Tensor, "k"],
         items: Shaped[Tensor, "r d"],
         margin: float,
@@ -235,27 +235,27 @@ class _Pairs:
         return (lead < self.wanted[rows]) | (lead <= 0), rivals, rival_scores
 
 
-def _hopeless(corrections: Sequence[int], pairs: int, patience: int, passes: int) -> bool:
-    """Whether about a third of the pairs would still be corrected in the last of `passes`, at the present rate.
+def _hopeless(corrections: Sequence[int], pairs: int, patience: int, epochs: int) -> bool:
+    """Whether about a third of the pairs would still be corrected in the last of `epochs`, at the present rate.
 
-    The rate is how the mean of the last `patience` passes lies below that of as many before. Corrections become rarer
+    The rate is how the mean of the last `patience` epochs lies below that of as many before. Corrections become rarer
     ever more slowly, so that a straight line promises too much rather than too little. The root of the number of pairs
     allows for chance. These numbers were chosen on random pairs near capacity (d from 64 to 1,000, integer codes of
-    four kinds, margins 0, 0.5 and 2); with other seeds, none of 761 runs that converge within 200 passes was ended,
+    four kinds, margins 0, 0.5 and 2); with other seeds, none of 761 runs that converge within 200 epochs was ended,
     and 157 of 286 that do not were.
     """
-    if not 2 * patience <= len(corrections) < passes:
+    if not 2 * patience <= len(corrections) < epochs:
         return False
     now, before = (sum(part) / patience for part in (corrections[-patience:], corrections[-2 * patience : -patience]))
     fall = max(before - now, 0) / patience
-    return now - fall * (passes - len(corrections)) > 0.3 * pairs + pairs**0.5
+    return now - fall * (epochs - len(corrections)) > 0.3 * pairs + pairs**0.5
 
 
 _BLOCK = 64
 """Pairs asked at once, at most; any number gives the same program where scores are exact."""
 
 _TOLD = 512
-"""Pairs visited between two reports of progress within a pass."""
+"""Pairs visited between two reports of progress within an epoch."""
 
 _ENCODED = 0.1
 """The share of the work that counts as done when all conditions are encoded."""
@@ -268,5 +268,5 @@ def _widest(x: Tensor) -> torch.dtype:
     return torch.complex128 if x.is_complex() else torch.float64
 
 
-def _blocks(conditions: Tensor | Conditions, targets: Tensor) -> zip:
+def _blocks(conditions: Tensor | LazyConditions, targets: Tensor) -> zip:
     return zip(conditions.split(256), targets.split(256), strict=True)

@@ -11,11 +11,11 @@ from torch.nn import functional
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning.base import Rule, grown
+from behaviours.learning.base import Rule, continued
 from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import flag, number, store, whole
-from behaviours.progress import Progress, between, silent
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import as_bipolar
@@ -36,9 +36,9 @@ class Gradient(Rule):
     | `hinge` | the sum of the squares by which the own result leads any other, or silence, by less than 1 |
     | `squared` | the squared distance of the scores from 1 for the own result and 0 for the others |
 
-    Adam with a cosine schedule goes `passes` times through the samples and, without `held_back`, answers with
-    the mean program of the last three tenths. With `held_back`, a share of the conditions is kept out of
-    training; the program that recalled most of them is the answer, and training stops after `patience` passes
+    Adam with a cosine schedule goes `epochs` times through the samples and, without `validation_fraction`, answers with
+    the mean program of the last three tenths. With `validation_fraction`, a share of the conditions is kept out of
+    training; the program that recalled most of them is the answer, and training stops after `patience` epochs
     without a better one.
 
     `sparse` writes the program as the difference of two squares and descends on their roots: the same
@@ -56,15 +56,15 @@ class Gradient(Rule):
     """
 
     name = "gradient"
-    counts = False
-    incremental = True
+    integer_programs = False
+    supports_partial_fit = True
 
     loss: Loss = "cross_entropy"
-    passes: int = 60
-    batch: int = 128
+    epochs: int = 60
+    batch_size: int = 128
     learning_rate: float = 0.05
     sparse: bool = False
-    held_back: float = 0.0
+    validation_fraction: float = 0.0
     patience: int = 10
     output: Output = "float"
     seed: int = 0
@@ -77,25 +77,25 @@ class Gradient(Rule):
                 raise ValueError(f"{field} is one of {', '.join(get_args(options))}; got {getattr(self, field)!r}")
         store(
             self,
-            passes=whole("passes", self.passes, 1),
-            batch=whole("batch", self.batch, 1),
+            epochs=whole("epochs", self.epochs, 1),
+            batch_size=whole("batch_size", self.batch_size, 1),
             learning_rate=number("learning_rate", self.learning_rate, 0, above=True, below=_FASTEST),
             sparse=flag("sparse", self.sparse),
-            held_back=number("held_back", self.held_back, 0, below=1),
+            validation_fraction=number("validation_fraction", self.validation_fraction, 0, below=1),
             patience=whole("patience", self.patience, 1),
             seed=whole("seed", self.seed, *_SEEDS),
         )
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """See `Rule.fit`. Raises `ValueError` if the share held back leaves no condition on one of both sides."""
         return self._learn(space, demonstrations, None, progress)
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         """See `Rule.partial_fit`: descend from the program at hand, with a new optimiser and a new schedule.
 
-        Nothing holds an earlier piece in place but the program's own inertia: take few passes or a low learning rate.
+        Nothing holds an earlier piece in place but the program's own inertia: take few epochs or a low learning rate.
         Raises `ValueError` unless `output` is `"float"`, since a rounded program cannot follow small steps.
         """
         if self.output != "float":
@@ -115,16 +115,16 @@ class Gradient(Rule):
     def _descend(
         self, space: Space, demonstrations: Demonstrations, before: Behaviour | None, progress: Progress
     ) -> Behaviour:
-        shown = Samples.of(space, demonstrations, between(progress, 0, 0.1))
+        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.1))
         if before is not None:
-            shown = shown.after(before.results)
+            shown = shown.with_known_results(before.results)
         aims = shown.targets("first" if self.contradictions == "all" else self.contradictions)
-        samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
+        samples = shown if self.contradictions == "all" else shown.resolved(self.contradictions)
         items = space.items(samples.results)
         generator = torch.Generator().manual_seed(self.seed)
         train, held = self._split(samples, generator)
         training = _Training(self, space.vsa, samples, items, before)
-        program, passes, updates = training.run(train, held, generator, between(progress, 0.1, 1))
+        program, epochs, updates = training.run(train, held, generator, subrange(progress, 0.1, 1))
         if not program.isfinite().all():
             raise ValueError(f"learning_rate={self.learning_rate:g} drove the program to infinity; take a lower one")
         answers = training.answers(program)
@@ -132,7 +132,7 @@ class Gradient(Rule):
         report = samples.report(
             self.name,
             contradicting=int((aims[shown.condition] != shown.result).sum()),
-            passes=passes,
+            epochs=epochs,
             updates=updates,
             wrong=int((answers[samples.condition] != samples.result).sum()),
         )
@@ -144,19 +144,19 @@ class Gradient(Rule):
             len(trained),
             contradicting=report.contradicting,
             samples=report.samples,
-            after=f" after {passes} passes",
-            remedy="more dimensions (dim), more passes or another learning_rate",
+            after=f" after {epochs} epochs",
+            remedy="more dimensions (dim), more epochs or another learning_rate",
             tolerated=FEW,
         )
-        return grown(before, Behaviour(space, program, samples.known(space.vsa), samples.results, report))
+        return continued(before, Behaviour(space, program, samples.known(space.vsa), samples.results, report))
 
     def _split(self, samples: Samples, generator: torch.Generator) -> tuple[Tensor, Tensor]:
         """The samples to train on and those held back: all of a condition on the same side."""
-        count = round(self.held_back * len(samples.conditions))
-        if self.held_back and not 0 < count < len(samples.conditions):
+        count = round(self.validation_fraction * len(samples.conditions))
+        if self.validation_fraction and not 0 < count < len(samples.conditions):
             raise ValueError(
-                f"held_back={self.held_back} of {len(samples.conditions)} conditions leaves none to "
-                f"{'train on' if count else 'hold back'}; give more conditions or another share"
+                f"validation_fraction={self.validation_fraction} of {len(samples.conditions)} conditions leaves none "
+                f"to {'train on' if count else 'hold back'}; give more conditions or another share"
             )
         away = torch.zeros(len(samples.conditions), dtype=torch.bool)
         away[torch.randperm(len(away), generator=generator)[:count]] = True
@@ -247,18 +247,20 @@ class _Training:
     def run(
         self, train: Tensor, held: Tensor, generator: torch.Generator, progress: Progress
     ) -> tuple[Tensor, int, int]:
-        """Descend; the program, the passes and the number of steps."""
+        """Descend; the program, the epochs and the number of steps."""
         rule = self.rule
         optimiser = torch.optim.Adam([self.parameters], lr=rule.learning_rate)
-        per_pass = math.ceil(len(train) / rule.batch)
-        best, best_wrong, best_pass = self.floats().detach().clone(), len(held) + 1, 0
+        steps_per_epoch = math.ceil(len(train) / rule.batch_size)
+        best, best_wrong, best_epoch = self.floats().detach().clone(), len(held) + 1, 0
         total, averaged = torch.zeros_like(best, dtype=torch.float64), 0
-        step = sweep = 0
-        for sweep in range(1, rule.passes + 1):
+        step = epoch = 0
+        for epoch in range(1, rule.epochs + 1):
             order = train[torch.randperm(len(train), generator=generator)]
-            for rows in order.tensor_split(per_pass):
+            for rows in order.tensor_split(steps_per_epoch):
                 for group in optimiser.param_groups:
-                    group["lr"] = rule.learning_rate * (1 + math.cos(math.pi * step / (per_pass * rule.passes))) / 2
+                    group["lr"] = (
+                        rule.learning_rate * (1 + math.cos(math.pi * step / (steps_per_epoch * rule.epochs))) / 2
+                    )
                 optimiser.zero_grad()
                 self.loss(rows).backward()
                 optimiser.step()
@@ -267,20 +269,20 @@ class _Training:
                         self.parameters.clamp_(min=_FLOOR)
                 step += 1
                 if step % _TOLD == 0:
-                    progress(step / (per_pass * rule.passes))
-            progress(sweep / rule.passes)
+                    progress(step / (steps_per_epoch * rule.epochs))
+            progress(epoch / rule.epochs)
             now = self.floats().detach()
             if not len(held):
-                if sweep > rule.passes - max(round(0.3 * rule.passes), 1):
+                if epoch > rule.epochs - max(round(0.3 * rule.epochs), 1):
                     total, averaged = total + now, averaged + 1
                 continue
             wrong = self.wrong(self.program(now), held)
             if wrong < best_wrong:
-                best, best_wrong, best_pass = now.clone(), wrong, sweep
-            elif sweep - best_pass >= rule.patience:
+                best, best_wrong, best_epoch = now.clone(), wrong, epoch
+            elif epoch - best_epoch >= rule.patience:
                 break
         answer = best if len(held) else (total / averaged).to(best.dtype)
-        return self.program(answer, scaled=False), sweep, step
+        return self.program(answer, scaled=False), epoch, step
 
 
 _SEEDS = -(2**63), 2**64 - 1
@@ -290,7 +292,7 @@ _FASTEST = 1e30
 """Learning rates stay below it, since steps of more do not fit into float32."""
 
 _TOLD = 64
-"""Steps between two reports of progress within a pass."""
+"""Steps between two reports of progress within an epoch."""
 
 _ROOT = 0.1
 """Where the roots of a sparse program start: programs of 0.01, small beside those learned."""

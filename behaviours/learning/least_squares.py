@@ -13,7 +13,7 @@ from behaviours.learning.base import Rule
 from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import number, store
-from behaviours.progress import Progress, between, silent
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import as_bipolar, is_integer
@@ -34,7 +34,7 @@ class LeastSquares(Rule):
     """
 
     name = "least_squares"
-    counts = False
+    integer_programs = False
 
     ridge: float = 1e-3
     contradictions: Contradictions | Literal["all"] = "all"
@@ -48,17 +48,17 @@ class LeastSquares(Rule):
         """See `Rule.supports`: element-wise binding of real numbers."""
         return vsa.elementwise and not vsa.dtype.is_complex
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """See `Rule.fit`."""
-        shown = Samples.of(space, demonstrations, between(progress, 0, 0.2))
-        samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
+        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2))
+        samples = shown if self.contradictions == "all" else shown.resolved(self.contradictions)
         shape = len(samples.conditions), len(samples.results)
         cells = samples.condition * shape[1] + samples.result
         counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
         items = space.items(samples.results)
         targets = counts / counts.sum(1, keepdim=True)
         conditions = samples.conditions[:]
-        program = solve(space.vsa, conditions, items, targets, self.ridge, between(progress, 0.2, 0.9))
+        program = solve(space.vsa, conditions, items, targets, self.ridge, subrange(progress, 0.2, 0.9))
         said = space.vsa.readout(program, items)(conditions).argmax(1)
         report = samples.report(
             self.name,
@@ -79,7 +79,7 @@ class LeastSquares(Rule):
         return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         """Raises `ValueError`: the solution alone cannot go on."""
         raise ValueError(
@@ -95,7 +95,7 @@ def solve(
     items: Shaped[Tensor, "r d"],
     targets: Float64[Tensor, "k r"],
     ridge: float,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Float[Tensor, "d"]:
     """The program p that minimises the sum over k and r of (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
 

@@ -9,11 +9,11 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
+from behaviours.learning.pair_accumulator import PairAccumulator
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
-from behaviours.learning.sums import Sums
 from behaviours.options import flag, number, store
 from behaviours.ordered import first_rows, in_order_of_appearance
-from behaviours.progress import Progress, between, silent
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.report import LearningReport
 from behaviours.space import Space
 
@@ -22,7 +22,7 @@ from behaviours.space import Space
 class OneShot(Rule):
     """Add the pair (condition, result) of every sample whose condition is not known yet.
 
-    `known` decides what *known* means (line 5, isDissimilar): `"equality"` with a stored condition, or the
+    `known` decides what *known* means (line 5, isDissimilar): `"exact"` with a stored condition, or the
     paper's `"similarity"` to knownCondHV above a threshold: `sigmas` standard deviations of the similarity
     of unrelated hypervectors, `sigmas / √d`, unless `threshold` gives a cosine. The similarity test takes
     some new conditions for known and, as more are stored, forgets the stored ones.
@@ -38,9 +38,9 @@ class OneShot(Rule):
     """
 
     name = "one_shot"
-    incremental = True
+    supports_partial_fit = True
 
-    known: Literal["equality", "similarity"] = "equality"
+    novelty: Literal["exact", "similarity"] = "exact"
     sigmas: float = 4.0
     threshold: float | None = None
     clip_each_step: bool = False
@@ -48,28 +48,28 @@ class OneShot(Rule):
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions)
-        if self.known not in ("equality", "similarity"):
-            raise ValueError(f"known is decided by 'equality' or 'similarity'; got {self.known!r}")
+        if self.novelty not in ("exact", "similarity"):
+            raise ValueError(f"novelty is 'exact' or 'similarity'; got {self.novelty!r}")
         store(self, sigmas=number("sigmas", self.sigmas), clip_each_step=flag("clip_each_step", self.clip_each_step))
         if self.threshold is not None:
             store(self, threshold=number("threshold", self.threshold))
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """See `Rule.fit`: the same bits as the loop over the samples, one by one."""
-        samples = Samples.of(space, demonstrations, between(progress, 0, 0.5))
-        return self._learn(space, samples, progress=between(progress, 0.5, 1))
+        samples = Samples.of(space, demonstrations, subrange(progress, 0, 0.5))
+        return self._learn(space, samples, progress=subrange(progress, 0.5, 1))
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         """See `Rule.partial_fit`: with contradictions settled by the first, the same bits as `fit` on all at once.
 
-        Raises `ValueError` for `known="equality"`, and if a program that was never clipped shall be clipped now.
+        Raises `ValueError` for `known="exact"`, and if a program that was never clipped shall be clipped now.
         """
-        if self.known == "equality":
+        if self.novelty == "exact":
             raise ValueError(
                 "a single hypervector does not remember which conditions it holds, so that no later piece can be "
-                "compared with them for equality; learn in pieces with known='similarity'"
+                "compared with them exactly; learn in pieces with novelty='similarity'"
             )
         vsa = behaviour.space.vsa
         clipped = vsa.normalize(torch.zeros(vsa.dim, dtype=vsa.accumulator)).dtype
@@ -78,22 +78,24 @@ class OneShot(Rule):
                 f"clip_each_step goes on from programs of {clipped}; this one is a sum in "
                 f"{behaviour.program.dtype}, so go on from behaviour.clipped()"
             )
-        samples = Samples.of(behaviour.space, demonstrations, between(progress, 0, 0.5)).after(behaviour.results)
-        return self._learn(behaviour.space, samples, behaviour, between(progress, 0.5, 1))
+        samples = Samples.of(behaviour.space, demonstrations, subrange(progress, 0, 0.5)).with_known_results(
+            behaviour.results
+        )
+        return self._learn(behaviour.space, samples, behaviour, subrange(progress, 0.5, 1))
 
     def _learn(
-        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = silent
+        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = no_progress
     ) -> Behaviour:
-        samples = shown if self.contradictions == "first" else shown.settled(self.contradictions)
-        added = Sums(space, samples, self.clip_each_step, progress)
+        samples = shown if self.contradictions == "first" else shown.resolved(self.contradictions)
+        added = PairAccumulator(space, samples, self.clip_each_step, progress)
         if before is not None:
-            added.go_on(before.program, before.known)
-        if self.known == "equality":
+            added.resume(before.program, before.known)
+        if self.novelty == "exact":
             # Nothing is forgotten: each condition is added where it first appears.
-            added.extend(first_rows(samples.condition))
+            added.add(first_rows(samples.condition))
         else:
             threshold = self.sigmas / space.vsa.dim**0.5 if self.threshold is None else self.threshold
-            added.extend_where_dissimilar(threshold)
+            added.add_where_dissimilar(threshold)
         held = torch.arange(0 if before is None else len(before.results), device=samples.result.device)
         results = samples.results[in_order_of_appearance(torch.cat([held, samples.result[added.rows]]))]
         report = _count(self.name, samples, added.accepted, len(added.rows))
@@ -102,7 +104,7 @@ class OneShot(Rule):
         if before is not None:
             # What this piece never stored was known from before, or seemed to be.
             piece = replace(report, presumed_known=report.falsely_known, falsely_known=0)
-            report = before.report.then(piece)
+            report = before.report.merged(piece)
         return Behaviour(space, added.program, added.known, results, report)
 
 

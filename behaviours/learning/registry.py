@@ -14,7 +14,7 @@ RULES: Registry[type[Rule]] = Registry(
 )
 
 
-def check_rule(rule: Any) -> Rule:
+def require_rule(rule: Any) -> Rule:
     """The rule as it is. Raises `TypeError`, saying what to write, for a name, a class, or anything else."""
     if isinstance(rule, Rule):
         return rule

@@ -8,9 +8,9 @@ from jaxtyping import Bool, Int64, Shaped
 from torch import Tensor
 
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning.conditions import Conditions, encode_distinct
+from behaviours.learning.conditions import LazyConditions, encode_distinct
 from behaviours.ordered import distinct_rows
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.report import LearningReport
 from behaviours.space import Space
 from torchvsa import VSA
@@ -31,7 +31,7 @@ def check_contradictions(given: str, *others: str) -> None:
 class Samples:
     """N samples over k distinct conditions and r distinct results, both in order of first appearance."""
 
-    conditions: Shaped[Tensor, "k d"] | Conditions
+    conditions: Shaped[Tensor, "k d"] | LazyConditions
     """The protected conditions; very many of them are encoded when they are asked for."""
     results: Int64[Tensor, "r m"]
     """The results, as levels of the actuators."""
@@ -41,7 +41,7 @@ class Samples:
     """Which result each sample has."""
 
     @classmethod
-    def of(cls, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> "Samples":
+    def of(cls, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> "Samples":
         """Check, quantise and encode a demonstration; conditions are the same if their hypervectors are.
 
         `progress` is told the share that is done, if it takes long. Raises if a row has no observed sensor.
@@ -56,7 +56,7 @@ class Samples:
         distinct_results, result = distinct_rows(levels)
         return cls(conditions, distinct_results, condition, result)
 
-    def after(self, results: Int64[Tensor, "p m"]) -> "Samples":
+    def with_known_results(self, results: Int64[Tensor, "p m"]) -> "Samples":
         """The same samples, where `results` were stored before: they come first, and new ones behind them."""
         joined, which = distinct_rows(torch.cat([results, self.results]))
         return replace(self, results=joined, result=which[len(results) :][self.result])
@@ -75,7 +75,7 @@ class Samples:
         chosen = torch.zeros(conditions, dtype=torch.int64, device=rows.device)
         return self.result[chosen.scatter_reduce(0, self.condition, rows, pick, include_self=False)]
 
-    def settled(self, contradictions: Contradictions) -> "Samples":
+    def resolved(self, contradictions: Contradictions) -> "Samples":
         """The same samples, each with the result that its condition shall have."""
         return replace(self, result=self.targets(contradictions)[self.condition])
 

@@ -2,7 +2,7 @@
 
 >>> from behaviours import OneShot, Priority
 >>> from behaviours.testing import check_policy, check_rule
->>> check_rule(OneShot(known="similarity"))
+>>> check_rule(OneShot(novelty="similarity"))
 >>> check_policy(Priority)
 
 Each raises `AssertionError` that names the first law that is broken. They run over a space of their own, or over the

@@ -97,7 +97,7 @@ def _readings_that_are_not_valid_are_refused(controller: Controller) -> None:
     for wrong in (good[:, :-1], torch.cat([good, good], 1), good[None]):
         refuses(ValueError, lambda wrong=wrong: controller.step(wrong, state))
     for column, sensor in enumerate(sensors):
-        if sensor.beyond == "error":
+        if sensor.out_of_range == "error":
             beyond = good.clone()
             beyond[1, column] = 2 * sensor.high - sensor.low
             refuses(ValueError, lambda wrong=beyond: controller.step(wrong, state))

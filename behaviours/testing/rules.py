@@ -13,8 +13,7 @@ from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import ConvergenceWarning, OneShot, Rule
-from behaviours.learning import check_rule as check_kind
+from behaviours.learning import ConvergenceWarning, OneShot, Rule, require_rule
 from behaviours.space import Space
 from behaviours.testing._controllers import CONTROLLER_LAWS
 from behaviours.testing._material import (
@@ -45,7 +44,7 @@ def check_rule(rule: Rule, space: Space | None = None) -> None:
     and rule stay as they are; progress rises to 1; `partial_fit` goes on as documented or raises `ValueError`; what is
     learned keeps the laws of `check_policy` that are not about speakers.
     """
-    check_kind(rule)
+    require_rule(rule)
     case = Trial(rule, a_space() if space is None else space)
     supported = rule.supports(case.space.vsa)
     with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
@@ -75,7 +74,10 @@ def _a_behaviour_over_the_given_space_is_learned(case: Trial) -> None:
     require(behaviour.space is case.space, "it is over another space than the given one")
     behaviour.check()
     require(not behaviour.program.requires_grad, "its program hangs on the graph of its training")
-    require(case.rule.counts or not is_integer(behaviour.program), "counts=False, yet the program holds integers")
+    require(
+        case.rule.integer_programs or not is_integer(behaviour.program),
+        "integer_programs=False, yet the program holds integers",
+    )
     bank = BehaviourBank(case.space)
     bank.learn("learned", case.shown(), case.rule)
     same_program(bank["learned"], behaviour)
@@ -223,7 +225,7 @@ def _pieces_go_on_or_are_refused(case: Trial) -> None:
         require(before.report == report, "the report of the behaviour before was changed")
         if after is None:
             continue
-        require(case.rule.incremental, "incremental=False, yet it goes on from a behaviour")
+        require(case.rule.supports_partial_fit, "supports_partial_fit=False, yet it goes on from a behaviour")
         require(after.space is before.space, "it goes on over another space")
         after.check()
         require(
@@ -250,7 +252,7 @@ def _demonstrations_that_are_not_valid_are_refused(case: Trial) -> None:
     refused(good.sensors, torch.cat([good.commands, good.commands], 1))
     refused(good.sensors, good.commands, sensor_names=[f"not {sensor.name}" for sensor in schema.sensors])
     for column, sensor in enumerate(schema.sensors):
-        if sensor.beyond == "error":
+        if sensor.out_of_range == "error":
             beyond = good.sensors.clone()
             beyond[-1, column] = 2 * sensor.high - sensor.low
             refused(beyond, good.commands)

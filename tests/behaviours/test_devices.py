@@ -197,10 +197,10 @@ RULES_AND_OPTIONS: list[Rule] = [
     OneShot("similarity"),
     OneShot("similarity", clip_each_step=True),
     OneShot(clip_each_step=True, contradictions="majority"),
-    ErrorDriven(passes=3),
-    ErrorDriven(passes=3, average=True, contradictions="latest"),
-    Gradient(passes=3),
-    Gradient(passes=3, sparse=True, held_back=0.2),
+    ErrorDriven(epochs=3),
+    ErrorDriven(epochs=3, average=True, contradictions="latest"),
+    Gradient(epochs=3),
+    Gradient(epochs=3, sparse=True, validation_fraction=0.2),
 ]
 
 
@@ -217,7 +217,7 @@ def check_learning(rule: Rule, name: str) -> None:
     from pretended import moved
 
     here, away = (rule.fit(s, TWICE) for s in spaces(name))
-    alike(here, away, exact=here.space.vsa.integer and rule.counts)
+    alike(here, away, exact=here.space.vsa.integer and rule.integer_programs)
     alike(here, moved(here), exact=True)
     alike(here.clipped(), away.clipped(), exact=False)
     alike(here.trainable(), away.trainable(), exact=False)
@@ -226,7 +226,9 @@ def check_learning(rule: Rule, name: str) -> None:
         here = rule.partial_fit(here, random_pairs(20, seed=1))
     except ValueError:
         return  # it cannot go on
-    alike(here, rule.partial_fit(away, random_pairs(20, seed=1)), exact=here.space.vsa.integer and rule.counts)
+    alike(
+        here, rule.partial_fit(away, random_pairs(20, seed=1)), exact=here.space.vsa.integer and rule.integer_programs
+    )
 
 
 def test_conditions_too_many_to_be_held(there: Callable[..., None]) -> None:

@@ -29,15 +29,15 @@ OPTIONS: list[Rule] = [
     ErrorDriven(average=True),
     ErrorDriven(contradictions="first"),
     LeastSquares(contradictions="majority"),
-    Gradient(passes=15, sparse=True),
-    Gradient(passes=15, output="int8"),
-    Gradient("hinge", passes=15),
+    Gradient(epochs=15, sparse=True),
+    Gradient(epochs=15, output="int8"),
+    Gradient("hinge", epochs=15),
 ]
 
 
 def quick(name: str) -> Rule:
     """A rule by its name, with options by which it does not take long."""
-    return Gradient(passes=15) if name == "gradient" else RULES.find(name)()
+    return Gradient(epochs=15) if name == "gradient" else RULES.find(name)()
 
 
 @pytest.mark.parametrize("vsa", ARCHITECTURES)
@@ -92,7 +92,7 @@ def test_folded_recall_is_recall_step_by_step(rule: str, vsa: str, protection: s
             assert_close(getattr(recall, field)[row].item(), getattr(expected, field), atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("rule", [rule for rule in RULES if RULES[rule].counts])
+@pytest.mark.parametrize("rule", [rule for rule in RULES if RULES[rule].integer_programs])
 @pytest.mark.parametrize(
     "vsa", [name for name in ARCHITECTURES if torchvsa.architecture(name, 8).integer or "MAP" in name]
 )

@@ -30,9 +30,8 @@ def test_the_seed_decides_every_codebook(vsa: str) -> None:
 def test_no_two_codebooks_are_alike() -> None:
     made = space(4000)
     assert isinstance(made.protect, SelfShift)
-    atoms = torch.cat(
-        [made.encoder.roles, made.encoder.codes, made.results.roles, made.results.codes, made.protect.h[None]]
-    ).double()
+    encoder, results = made.encoder, made.result_encoder
+    atoms = torch.cat([encoder.roles, encoder.codes, results.roles, results.codes, made.protect.h[None]]).double()
     cosines = (atoms @ atoms.T / 4000).fill_diagonal_(0)
     assert cosines.abs().max() < 5 / 4000**0.5
 

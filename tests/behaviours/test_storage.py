@@ -30,7 +30,7 @@ def bank(vsa: str = "MAP-C", protection: Any = "self_shift", dtype: str | None =
     made = BehaviourBank(space(128, vsa, dtype, protection, seed=3, **encoder))
     made.learn("seek light", random_pairs(9), OneShot("similarity", clip_each_step=True))
     with no_convergence_warnings():
-        made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(passes=2))
+        made.learn("avoid", random_pairs(30, seed=1), ErrorDriven(epochs=2))
     return made
 
 
@@ -188,7 +188,7 @@ CHANGES: dict[str, Callable[[dict[str, Any], dict[str, torch.Tensor]], Any]] = {
     "more bins than codes": lambda about, _: about["space"]["encoder"]["values"].update(bins=10**9),
     "more levels than codes": lambda about, _: about["space"]["schema"]["actuators"][0].update(levels=10**9),
     "more dimensions than codes": lambda about, _: about["space"]["vsa"].update(dim=10**12),
-    "a range beyond all numbers": lambda about, _: about["space"]["schema"]["sensors"][0].update(high=10**400),
+    "a range out of float64": lambda about, _: about["space"]["schema"]["sensors"][0].update(high=10**400),
     "behaviours of another kind": lambda about, _: about.update(behaviours=["avoid"]),
     "a name twice": lambda about, _: about["behaviours"][1].update(name="seek light"),
     "a name that is no text": lambda about, _: about["behaviours"][1].update(name=1),
@@ -226,7 +226,7 @@ def test_banks_that_describe_something_else(change: str, tmp_path: Path) -> None
 CODES: dict[str, tuple[str, Callable[[torch.Tensor], object]]] = {
     "MAP-B": ("encoder.roles", lambda codes: codes[0, 0].fill_(0)),
     "HRR": ("encoder.values.0.codes", lambda codes: codes[0, 0].fill_(math.nan)),
-    "FHRR": ("results.values.0.codes", lambda codes: codes[0, 0].mul_(3)),
+    "FHRR": ("result_encoder.values.0.codes", lambda codes: codes[0, 0].mul_(3)),
 }
 
 

@@ -10,7 +10,7 @@ from robots import space
 from torch import Tensor
 
 from behaviours import Behaviour, BehaviourBank, Demonstrations, ErrorDriven, LeastSquares, OneShot, Policy, Priority
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.recall import Recall
 from behaviours.space import Space
 from behaviours.testing import check_policy, check_rule
@@ -20,7 +20,7 @@ from torchvsa import VSA
 class Miscounting(OneShot):
     """Reports a sample too many."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         behaviour = super().fit(space, demonstrations, progress)
         behaviour.report = replace(behaviour.report, samples=behaviour.report.samples + 1)
         return behaviour
@@ -29,7 +29,7 @@ class Miscounting(OneShot):
 class Random(OneShot):
     """Adds noise from PyTorch's global generator."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         behaviour = super().fit(space, demonstrations, progress)
         behaviour.program.add_(torch.randint_like(behaviour.program, 2))
         return behaviour
@@ -38,7 +38,7 @@ class Random(OneShot):
 class Seeding(OneShot):
     """Seeds PyTorch's global generator."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         torch.manual_seed(0)
         return super().fit(space, demonstrations, progress)
 
@@ -50,7 +50,7 @@ class Remembering(OneShot):
     name = "remembering"
     past: list[Tensor] = field(default_factory=list, repr=False)
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         behaviour = super().fit(space, demonstrations, progress)
         self.past.append(behaviour.program.clone())
         behaviour.program = torch.stack(self.past).sum(0, dtype=torch.int32)
@@ -60,7 +60,7 @@ class Remembering(OneShot):
 class Forgetful(OneShot):
     """Learns the first half alone."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         half = torch.arange(len(demonstrations)) <= len(demonstrations) // 2
         return super().fit(space, demonstrations.where(half), progress)
 
@@ -68,7 +68,7 @@ class Forgetful(OneShot):
 class Greedy(OneShot):
     """Writes into the demonstration."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         behaviour = super().fit(space, demonstrations, progress)
         demonstrations.commands.neg_()
         return behaviour
@@ -77,7 +77,7 @@ class Greedy(OneShot):
 class Hasty(OneShot):
     """Never says that it is done."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         return super().fit(space, demonstrations, lambda share: progress(share / 2))
 
 
@@ -85,7 +85,7 @@ class Overwriting(ErrorDriven):
     """Goes on within the behaviour that it was given."""
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         after = super().partial_fit(behaviour, demonstrations, progress)
         behaviour.program.copy_(after.program)
@@ -96,7 +96,7 @@ class Crashing(OneShot):
     """Cannot go on, and says so in its own way."""
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         raise NotImplementedError("not today")
 
@@ -104,7 +104,7 @@ class Crashing(OneShot):
 class Undifferentiable(OneShot):
     """Learns nothing where gradients are off."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         behaviour = super().fit(space, demonstrations, progress)
         behaviour.program *= int(torch.is_grad_enabled())
         return behaviour
@@ -113,7 +113,7 @@ class Undifferentiable(OneShot):
 class Careless(OneShot):
     """Takes rows in which nothing was observed, and leaves them out."""
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         return super().fit(space, demonstrations.where(~demonstrations.sensors.isnan().all(1)), progress)
 
 
@@ -167,7 +167,7 @@ class Steady(Priority):
             torch.stack([getattr(answer, name) for answer in answers])[speaker.clamp(min=0), rows]
             for name in ("commands", "similarity", "margin", "familiarity")
         )
-        return Recall(commands, similarity, margin, familiarity, speaker).blank(blind), (past, speaker)
+        return Recall(commands, similarity, margin, familiarity, speaker).mask_unobserved(blind), (past, speaker)
 
 
 class Hiding(Priority):
@@ -226,8 +226,8 @@ class Talking(Priority):
 class Unnamed(Priority):
     """Counts speakers from 1."""
 
-    def ask(self, conditions: Tensor) -> Recall:
-        recall = super().ask(conditions)
+    def query(self, conditions: Tensor) -> Recall:
+        recall = super().query(conditions)
         assert recall.speaker is not None
         return recall._replace(speaker=recall.speaker + 1)
 
@@ -239,8 +239,8 @@ class Live(Priority):
         super().__init__(bank)
         self.bank = bank
 
-    def ask(self, conditions: Tensor) -> Recall:
-        return Priority(self.bank).ask(conditions)
+    def query(self, conditions: Tensor) -> Recall:
+        return Priority(self.bank).query(conditions)
 
 
 class Loose(Priority):
@@ -250,23 +250,23 @@ class Loose(Priority):
         super().__init__(bank)
         self.others = [copy.deepcopy(Priority(bank))]
 
-    def ask(self, conditions: Tensor) -> Recall:
-        return self.others[0].ask(conditions)
+    def query(self, conditions: Tensor) -> Recall:
+        return self.others[0].query(conditions)
 
 
 class Dark(Priority):
     """Answers otherwise where gradients are off."""
 
-    def ask(self, conditions: Tensor) -> Recall:
-        recall = super().ask(conditions)
+    def query(self, conditions: Tensor) -> Recall:
+        recall = super().query(conditions)
         return recall if torch.is_grad_enabled() else recall._replace(similarity=recall.similarity * 0)
 
 
 class Endless(Priority):
     """Gives commands beyond the range."""
 
-    def ask(self, conditions: Tensor) -> Recall:
-        recall = super().ask(conditions)
+    def query(self, conditions: Tensor) -> Recall:
+        recall = super().query(conditions)
         return recall._replace(commands=recall.commands * 10)
 
 

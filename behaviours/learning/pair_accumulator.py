@@ -11,7 +11,7 @@ from torch import Tensor
 
 from behaviours.learning.samples import Samples
 from behaviours.ordered import distinct_rows
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.space import Space
 from torchvsa._numerics import as_bipolar, inner_products, is_integer, norms, real_parts
 
@@ -31,13 +31,13 @@ class _Block:
         return len(self.condition)
 
 
-class Sums:
+class PairAccumulator:
     """`state` `[2, d]`, the program above the known conditions, and `rows`, the samples that are in them.
 
     They stay raw accumulators, or with `clip` are normalised after each addition.
     """
 
-    def __init__(self, space: Space, samples: Samples, clip: bool, progress: Progress = silent) -> None:
+    def __init__(self, space: Space, samples: Samples, clip: bool, progress: Progress = no_progress) -> None:
         self.vsa, self.samples, self.clip = space.vsa, samples, clip
         self.items = space.items(samples.results)
         nothing = torch.zeros(2, self.vsa.dim, dtype=self.vsa.accumulator, device=self.items.device)
@@ -46,7 +46,7 @@ class Sums:
         self.rows: list[int] = []
         self.empty = True
 
-    def go_on(self, program: Shaped[Tensor, "d"], known: Shaped[Tensor, "d"]) -> None:
+    def resume(self, program: Shaped[Tensor, "d"], known: Shaped[Tensor, "d"]) -> None:
         """Start from what was learned before."""
         wide = torch.promote_types(program.dtype, known.dtype)
         state = torch.stack([program.detach().to(wide), known.to(wide)])
@@ -70,7 +70,7 @@ class Sums:
         accepted[self.rows] = True
         return accepted
 
-    def extend(self, rows: Int64[Tensor, "N"]) -> None:
+    def add(self, rows: Int64[Tensor, "N"]) -> None:
         """Add the pairs of these samples."""
         for block in self._blocks(rows):
             if self.clip:
@@ -81,7 +81,7 @@ class Sums:
                 self._add(block, slice(None))
         self.rows += rows.tolist()
 
-    def extend_where_dissimilar(self, threshold: float) -> None:
+    def add_where_dissimilar(self, threshold: float) -> None:
         """Go through the samples in order and add those that `known` does not resemble.
 
         An empty memory resembles nothing, even where the threshold is negative.
