@@ -104,7 +104,7 @@ def test_ways_that_do_not_exist(name: str) -> None:
         if name in ("least_squares", "gradient")
         else ("'first', 'majority' or 'latest'")
     )
-    with pytest.raises(ValueError, match=f"contradictions are settled by {choices}; got 'loudest'"):
+    with pytest.raises(ValueError, match=f"contradictions is {choices}; got 'loudest'"):
         rule(contradictions="loudest")
     if "all" not in choices:
         with pytest.raises(ValueError, match="got 'all'"):

@@ -183,7 +183,7 @@ def test_gradients_may_be_off_around_pieces(rule: Gradient, vsa: str, off: Any) 
 
 
 def test_a_learning_rate_that_is_too_high_is_told() -> None:
-    with pytest.raises(ValueError, match=r"learning_rate=1e\+25 drove the program to infinity; take a lower one"):
+    with pytest.raises(ValueError, match=r"learning_rate=1e\+25 made the program infinite; take a lower one"):
         Gradient("squared", learning_rate=1e25, epochs=3).fit(space(64), random_pairs(20))
 
 

@@ -94,7 +94,7 @@ def test_a_missing_reading_is_left_out_and_a_blind_row_refused() -> None:
     X[3] = np.nan
     with pytest.raises(ValueError, match="row 3 has no observed feature"):
         model.predict(X)
-    with pytest.raises(ValueError, match="row 3 of the demonstration has no observed sensor"):
+    with pytest.raises(ValueError, match="row 3 of the demonstrations has no observed sensor"):
         model.fit(X, y)
 
 

@@ -227,7 +227,7 @@ def test_the_file_names_sensors_and_actuators_and_replaces_another(tmp_path: Pat
 
 def test_complex_codes_are_refused(tmp_path: Path) -> None:
     behaviour = OneShot().fit(space(64, "FHRR"), random_pairs(3))
-    with pytest.raises(ValueError, match=r"ONNX knows no complex numbers, so that FHRR\(dim=64"):
+    with pytest.raises(ValueError, match=r"ONNX has no complex numbers, so that FHRR\(dim=64"):
         to_onnx(behaviour, tmp_path / "x")
     assert list(tmp_path.iterdir()) == []
 

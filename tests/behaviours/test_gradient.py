@@ -7,7 +7,7 @@ import torch
 from robots import correct, random_pairs, same_bits, space
 
 from behaviours import Demonstrations, Gradient, Space
-from behaviours.learning import gradient as module
+from behaviours.learning import descent as module
 from behaviours.learning.samples import Samples
 
 SPREAD = {"name": "self_shift", "width": "sum"}
@@ -30,9 +30,9 @@ def test_one_step_follows_the_gradient_of_the_loss(sparse: bool) -> None:
     samples = Samples.of(made, shown)
     assert isinstance(samples.conditions, torch.Tensor)
     items = made.items(samples.results)
-    training = module._Training(Gradient(sparse=sparse), made.vsa, samples, items)
+    descent = module.Descent(Gradient(sparse=sparse), made.vsa, samples, items)
     rows = torch.arange(20)
-    training.loss(rows).backward()
+    descent.loss(rows).backward()
     # Where all scores are 0 every result, and silence, has the same share.
     shares = torch.full((20, len(items)), 1 / (len(items) + 1)) - torch.nn.functional.one_hot(
         samples.result, len(items)
@@ -41,8 +41,8 @@ def test_one_step_follows_the_gradient_of_the_loss(sparse: bool) -> None:
     slope = ((samples.conditions.float().T @ shares) * (items.float() / lengths[:, None]).T).sum(1) / 20
     root = module._ROOT
     expected = torch.stack([2 * root * slope, -2 * root * slope]) if sparse else slope
-    assert training.parameters.grad is not None
-    torch.testing.assert_close(training.parameters.grad, expected, atol=1e-6, rtol=1e-4)
+    assert descent.parameters.grad is not None
+    torch.testing.assert_close(descent.parameters.grad, expected, atol=1e-6, rtol=1e-4)
 
 
 @pytest.mark.parametrize("vsa", ["MAP-C", "HRR", "FHRR"])
@@ -98,7 +98,7 @@ def test_held_back_conditions_stop_the_training() -> None:
     assert 3 < behaviour.report.epochs < 80
     assert behaviour.report.wrong < 0.05 * len(shown)
     one = Demonstrations([[1.0, 1, 1]], [[0.0, 0]])
-    with pytest.raises(ValueError, match=r"validation_fraction=0.2 of 1 conditions leaves none to hold back"):
+    with pytest.raises(ValueError, match=r"validation_fraction=0.2 of 1 conditions leaves none to validate with"):
         rule.fit(space(64), one)
     with pytest.raises(ValueError, match=r"validation_fraction=0.9 of 1 conditions leaves none to train on"):
         Gradient(validation_fraction=0.9).fit(space(64), one)

@@ -75,7 +75,7 @@ def test_a_rule_is_an_object() -> None:
 def test_a_report_counts(field: str, value: Any) -> None:
     good: dict[str, Any] = {"samples": 5, "new": np.int64(4)}
     assert type(LearningReport("one_shot", **good).new) is int
-    with pytest.raises(ValueError, match=f"{field} is a whole number from 0 on; got"):
+    with pytest.raises(ValueError, match=f"{field} is a whole number of at least 0; got"):
         LearningReport("one_shot", **good | {field: value})
     with pytest.raises(ValueError, match="the rule of a report"):
         LearningReport(cast(Any, 5 if value == "x" else value), **good)

@@ -182,7 +182,9 @@ def test_a_clipped_behaviour_goes_on_clipped_or_raw() -> None:
     first, then = cut(random_pairs(12), [6])
     made = space(512)
     raw = OneShot().fit(made, first)
-    with pytest.raises(ValueError, match=r"programs of torch.int8.*torch.int32, so go on from behaviour.clipped\(\)"):
+    with pytest.raises(
+        ValueError, match=r"programs of torch.int8.*torch.int32, so continue from behaviour.clipped\(\)"
+    ):
         OneShot("similarity", clip_each_step=True).partial_fit(raw, then)
     clipped = OneShot("similarity", clip_each_step=True).partial_fit(raw.clipped(), then)
     assert clipped.program.dtype == torch.int8
@@ -194,7 +196,7 @@ def test_rules_that_cannot_say_why() -> None:
     shown = random_pairs(5)
     behaviour = OneShot().fit(space(64), shown)
     for rule, words in (
-        (LeastSquares(), "inverse covariance"),
+        (LeastSquares(), "covariance of all earlier pairs"),
         (OneShot(), "does not remember which conditions it holds.*novelty='similarity'"),
         (Gradient(output="int8"), "rounded to 'int8'.*output='float'"),
     ):
@@ -217,7 +219,7 @@ class Whole(OneShot):
 
 def test_rules_need_not_go_on() -> None:
     shown = random_pairs(5)
-    with pytest.raises(ValueError, match="'whole' cannot go on from a behaviour"):
+    with pytest.raises(ValueError, match="'whole' cannot continue from a behaviour"):
         Whole().partial_fit(OneShot().fit(space(64), shown), shown)
 
 
@@ -231,6 +233,6 @@ def test_a_bank_begins_and_goes_on() -> None:
     assert bank.names == ["seek"]
     assert same_bits(bank["seek"].program, rule.fit(bank.space, shown).program)
     before = bank["seek"]
-    with pytest.raises(ValueError, match="inverse covariance"):
+    with pytest.raises(ValueError, match="covariance of all earlier pairs"):
         bank.partial_fit("seek", then, LeastSquares())
     assert bank["seek"] is before

@@ -112,7 +112,7 @@ def test_float_and_integer_codes_learn_the_same_program(rule: str) -> None:
 @rules
 def test_a_row_without_any_observed_sensor_is_refused(rule: str) -> None:
     shown = Demonstrations([[1.0, 2, 3], [math.nan] * 3], [[0.0, 0], [1, 1]])
-    with pytest.raises(ValueError, match="row 1 of the demonstration has no observed sensor"):
+    with pytest.raises(ValueError, match="row 1 of the demonstrations has no observed sensor"):
         RULES[rule]().fit(space(64), shown)
 
 
@@ -120,7 +120,7 @@ def test_a_row_without_any_observed_sensor_is_refused(rule: str) -> None:
 def test_values_out_of_range_are_refused(rule: str) -> None:
     with pytest.raises(ValueError, match=r"sensor 'front' reads 21 in row 1; its range is \[0, 20\]"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0, 0], [0, 0, 21]], [[0.0, 0], [0, 0]]))
-    with pytest.raises(ValueError, match=r"actuator 'right_motor' is told -1.5 in row 0; its range is \[-1, 1\]"):
+    with pytest.raises(ValueError, match=r"actuator 'right_motor' has the command -1.5 in row 0; its range is \[-1, 1\]"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0, 0]], [[0.0, -1.5]]))
     with pytest.raises(ValueError, match=r"left, right, front.*got shape \(1, 2\)"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0]], [[0.0, 0]]))

@@ -121,7 +121,7 @@ class Average(Rule):
         most = counts.view(shape).argmax(1)
         report = samples.report(self.name, contradicting=int((most[samples.condition] != samples.result).sum()))
         progress(1.0)
-        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+        return Behaviour(space, program, samples.condition_sum(space.vsa), samples.results, report)
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
