@@ -120,7 +120,8 @@ def test_a_row_without_any_observed_sensor_is_refused(rule: str) -> None:
 def test_values_out_of_range_are_refused(rule: str) -> None:
     with pytest.raises(ValueError, match=r"sensor 'front' reads 21 in row 1; its range is \[0, 20\]"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0, 0], [0, 0, 21]], [[0.0, 0], [0, 0]]))
-    with pytest.raises(ValueError, match=r"actuator 'right_motor' has the command -1.5 in row 0; its range is \[-1, 1\]"):
+    message = r"actuator 'right_motor' has the command -1.5 in row 0; its range is \[-1, 1\]"
+    with pytest.raises(ValueError, match=message):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0, 0]], [[0.0, -1.5]]))
     with pytest.raises(ValueError, match=r"left, right, front.*got shape \(1, 2\)"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0]], [[0.0, 0]]))

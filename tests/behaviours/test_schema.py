@@ -90,7 +90,8 @@ def test_infinite_readings_are_never_accepted(out_of_range: Literal["error", "cl
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -0.1, 4.1])
 def test_commands_out_of_range_name_actuator_range_and_row(value: float) -> None:
-    with pytest.raises(ValueError, match=rf"actuator 'wheel' has the command {value:g} in row 1; its range is \[0, 4\] m/s"):
+    message = rf"actuator 'wheel' has the command {value:g} in row 1; its range is \[0, 4\] m/s"
+    with pytest.raises(ValueError, match=message):
         schema().command_levels([[1.0], [value]])
 
 
