@@ -1,4 +1,4 @@
-"""Behaviours as hypervectors: learned from demonstrations, asked with readings, combined by adding them."""
+"""Robot behaviours as hypervectors: learned from demonstrations, called with sensor readings, combined by addition."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +47,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The estimators, which alone need scikit-learn, are loaded when they are first asked for."""
+    """Import the estimators on first access, since they alone need scikit-learn."""
     if name not in ("BehaviourClassifier", "BehaviourRegressor"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     try:

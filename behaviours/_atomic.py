@@ -1,4 +1,4 @@
-"""Write a file as a whole, or not at all."""
+"""Write a file completely, or not at all."""
 
 import hashlib
 import os
@@ -8,20 +8,20 @@ from pathlib import Path
 
 try:
     import fcntl
-except ImportError:  # Windows has no such locks: there, leftovers of killed processes stay
+except ImportError:  # Windows has no such locks: there, temporary files of killed processes stay
     fcntl = None
 
 
 def write_atomically(path: str | Path, content: bytes) -> Path:
-    """Write `content` beside `path` and move it there: readers see the old file or the new one, never half.
+    """Write `content` to a temporary file in the same folder, and move it to `path`.
 
-    A file that is replaced keeps its permissions, a symbolic link keeps pointing to it (a hard link does not: it keeps
-    the old content). Files that killed writers of the same `path` left behind are removed. Raises `OSError` naming
-    `path`, and leaves the old file as it was.
+    Readers see the old file or the new one, never a part. A replaced file keeps its permissions, and symbolic links
+    still point to it (a hard link keeps the old content). Temporary files of killed writers of the same `path` are
+    removed. Raises `OSError` that names `path`; the old file is then unchanged.
     """
     path = Path(path)
     target = Path(os.path.realpath(path))
-    # Short and of a fixed length, so that any name that the folder takes can be saved.
+    # Short and of fixed length, so that the temporary file of any valid name has a valid name too.
     prefix = f".{hashlib.sha256(os.fsencode(target.name)).hexdigest()[:12]}-"
     try:
         _remove_leftovers(target.parent, prefix)
@@ -49,13 +49,13 @@ def write_atomically(path: str | Path, content: bytes) -> Path:
 
 
 def _create(folder: Path, prefix: str) -> tuple[int, Path]:
-    """A new file that is locked as long as it is open: a sign to others that its writer lives."""
+    """Create a file that is locked while it is open, which tells other processes that its writer is alive."""
     while True:
         temporary = folder / f"{prefix}{secrets.token_hex(6)}.tmp"
         handle = os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY | getattr(os, "O_CLOEXEC", 0), 0o666)
         if _locked(handle) is not False and temporary.exists():
             return handle, temporary
-        # Another writer took it for a leftover in the moment before it was locked.
+        # Another writer removed it before it was locked.
         os.close(handle)
         temporary.unlink(missing_ok=True)
 
@@ -72,7 +72,7 @@ def _remove_leftovers(folder: Path, prefix: str) -> None:
 
 
 def _locked(handle: int) -> bool | None:
-    """Whether this process got the lock of a file; None where there are no locks."""
+    """Whether this process could lock the file; None where there are no locks."""
     if fcntl is None:
         return None
     try:
@@ -85,7 +85,7 @@ def _locked(handle: int) -> bool | None:
 
 
 def _sync_folder(folder: Path) -> None:
-    """Make the move itself survive a loss of power, where the system can."""
+    """Flush the move to disk, where the system supports it."""
     with suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:

@@ -1,4 +1,4 @@
-"""Sums of behaviours: their programs, and what they are made of."""
+"""Weighted sums of behaviours: their programs and their terms."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,15 +21,15 @@ _LARGEST = 2**53
 
 @dataclass(frozen=True, eq=False)
 class Term:
-    """A learned behaviour within a sum, without its program.
+    """One learned behaviour in a weighted sum, without its program.
 
-    Terms are the same where their fingerprints are: then programs, known conditions and results are equal.
+    Two terms are equal if their fingerprints are: then programs, known conditions and results are equal.
     """
 
     name: str
-    """The name under which a bank kept it; may be empty."""
+    """The name of the behaviour in its bank; may be empty."""
     weight: float
-    """A plain int where it is whole."""
+    """An int if it is whole, else a float."""
     report: LearningReport
     results: Int64[Tensor, "k m"]
     """Its results, as levels of the actuators."""
@@ -37,10 +37,12 @@ class Term:
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str) or not isinstance(self.fingerprint, str) or not self.fingerprint:
-            raise ValueError(f"a term has a name and a fingerprint, texts; got {self.name!r}, {self.fingerprint!r}")
+            raise ValueError(
+                f"the name and the fingerprint of a term are strings; got {self.name!r}, {self.fingerprint!r}"
+            )
         object.__setattr__(self, "weight", checked_weight(self.weight))
         if self.weight == 0:
-            raise ValueError("the weight of a term is not 0")
+            raise ValueError("the weight of a term cannot be 0")
 
     def __str__(self) -> str:
         name = self.name or self.report.rule
@@ -48,15 +50,15 @@ class Term:
 
 
 def checked_weight(value: Any) -> float:
-    """A weight as a plain number, an int where it is whole. Raises `ValueError` for what is no finite number."""
+    """`value` as an int if it is whole, else as a float. Raises `ValueError` unless it is a finite number."""
     if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
         raise ValueError(f"the weight of a behaviour is a finite number; got {value!r}")
     number = float(value)
     return int(number) if number.is_integer() else number
 
 
-def added(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """The terms, in order of first appearance: weights of the same add up, and those that cancel are left out."""
+def merge_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
+    """Add the weights of equal terms, and drop terms of weight 0; in order of first appearance."""
     total: dict[str, float] = {}
     first: dict[str, Term] = {}
     for term in terms:
@@ -65,20 +67,20 @@ def added(terms: Sequence[Term]) -> tuple[Term, ...]:
     return tuple(replace(term, weight=total[key]) for key, term in first.items() if total[key])
 
 
-def results_of(terms: Sequence[Term]) -> Int64[Tensor, "k m"]:
-    """The results of all terms, each once."""
+def merged_results(terms: Sequence[Term]) -> Int64[Tensor, "k m"]:
+    """The distinct results of all terms."""
     return distinct_rows(torch.cat([term.results for term in terms]))[0]
 
 
-def report_of(terms: Sequence[Term]) -> LearningReport:
-    """The counts of all terms, whatever their weights, and what the terms are."""
+def merged_report(terms: Sequence[Term]) -> LearningReport:
+    """The report of a sum: the counts of all terms added without weights, and the terms as strings."""
     counts = ("samples", "new", "truly_known", "falsely_known", "re_added", "contradicting", "presumed_known")
     total = {name: sum(getattr(term.report, name) for term in terms) for name in counts}
     return LearningReport("sum", **total, terms=tuple(map(str, terms)))
 
 
-def described(terms: Sequence[Term], results: Int64[Tensor, "k m"]) -> list[dict[str, Any]]:
-    """Plain values, for a file; `terms_from` is the inverse."""
+def terms_to_dicts(terms: Sequence[Term], results: Int64[Tensor, "k m"]) -> list[dict[str, Any]]:
+    """The terms as plain values, for a file; `terms_from_dicts` is the inverse."""
     rows = [tuple(row) for row in results.tolist()]
     return [
         {
@@ -90,40 +92,40 @@ def described(terms: Sequence[Term], results: Int64[Tensor, "k m"]) -> list[dict
     ]
 
 
-def terms_from(data: Sequence[Mapping[str, Any]], results: Int64[Tensor, "k m"]) -> tuple[Term, ...]:
-    """The terms that `described` describes. Raises `ValueError` unless they have these results, all of them."""
+def terms_from_dicts(data: Sequence[Mapping[str, Any]], results: Int64[Tensor, "k m"]) -> tuple[Term, ...]:
+    """The inverse of `terms_to_dicts`. Raises `ValueError` unless the terms have exactly these results."""
     terms = []
     for entry in data:
-        places = list(entry["results"])
-        if any(isinstance(place, bool) or not isinstance(place, int) or place < 0 for place in places):
-            raise ValueError(f"the results of a term are places in those of the sum; got {places!r:.80}")
+        indices = list(entry["results"])
+        if any(isinstance(index, bool) or not isinstance(index, int) or index < 0 for index in indices):
+            raise ValueError(f"the results of a term are indices into those of the sum; got {indices!r:.80}")
         report = LearningReport(**entry["report"])
-        terms.append(Term(**{**entry, "report": report, "results": results[places]}))
-    if not terms or len(added(terms)) < len(terms) or not torch.equal(results_of(terms), results):
+        terms.append(Term(**{**entry, "report": report, "results": results[indices]}))
+    if not terms or len(merge_terms(terms)) < len(terms) or not torch.equal(merged_results(terms), results):
         raise ValueError("the terms do not make up the behaviour's results")
     return tuple(terms)
 
 
 def weighted_sum(vsa: VSA, weights: Sequence[float], vectors: Sequence[Shaped[Tensor, "d"]]) -> Shaped[Tensor, "d"]:
-    """`Σ wᵢ vᵢ` of programs as a raw accumulator, exact where all of them, and the weights, are whole.
+    """The weighted sum `Σ wᵢ vᵢ` as a raw accumulator; exact if all programs and weights are integers.
 
-    Raises `ValueError` if its elements could be larger than 2^53, or if all of them lie below 2^-53.
+    Raises `ValueError` if elements of the sum could exceed 2^53, or if all are smaller than 2^-53.
     """
-    rows = stacked(vectors)
+    rows = stack_programs(vectors)
     sizes = rows.to(torch.int64 if is_integer(rows) else rows.dtype).abs().amax(-1).tolist()
     largest = sum(abs(weight) * size for weight, size in zip(weights, sizes, strict=True))
     if largest > _LARGEST or 0 < largest < 1 / _LARGEST:
         raise ValueError(
             f"with weights {', '.join(f'{weight:g}' for weight in weights)} the elements of the sum reach {largest:g}; "
-            "they are exact, and their squares finite, between 2^-53 and 2^53: give weights nearer to 1"
+            "only between 2^-53 and 2^53 are they exact and their squares finite: give weights nearer to 1"
         )
     if is_integer(rows) and all(isinstance(weight, int) for weight in weights) and largest >= 2**31:
         return (rows.to(torch.float64) * torch.tensor(weights, dtype=torch.float64, device=rows.device)[:, None]).sum(0)
     return vsa.superpose(rows, weights=torch.tensor(weights, device=rows.device))
 
 
-def stacked(vectors: Sequence[Shaped[Tensor, "d"]]) -> Shaped[Tensor, "b d"]:
-    """Programs `[b, d]` in one type: raw and clipped ones (smaller types, bits that count as votes) may be mixed."""
+def stack_programs(vectors: Sequence[Shaped[Tensor, "d"]]) -> Shaped[Tensor, "b d"]:
+    """Stack programs to `[b, d]` in their common type; raw and clipped programs may be mixed, bits become -1 and +1."""
     votes = [as_bipolar(vector) for vector in vectors]
-    wide = reduce(torch.promote_types, (vote.dtype for vote in votes))
-    return torch.stack([vote.to(wide) for vote in votes])
+    dtype = reduce(torch.promote_types, (vote.dtype for vote in votes))
+    return torch.stack([vote.to(dtype) for vote in votes])

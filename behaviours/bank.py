@@ -1,4 +1,4 @@
-"""Several named behaviours over one space of codebooks."""
+"""A collection of named behaviours over one space."""
 
 from collections.abc import Iterator, Sized
 from functools import partial
@@ -9,55 +9,70 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor, nn
 
-from behaviours.algebra import described, terms_from
+from behaviours.algebra import terms_from_dicts, terms_to_dicts
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient, Rule, check_rule
-from behaviours.progress import Progress, silent
-from behaviours.recall import Recall, asked_once
+from behaviours.learning import Gradient, Rule, require_rule
+from behaviours.progress import Progress, no_progress
+from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
 from behaviours.space import Space
-from behaviours.storage import Layout, check_layout, load_tensors, naming, save_tensors
+from behaviours.storage import Layout, check_layout, error_context, load_tensors, save_tensors
 from torchvsa._blocks import by_blocks
 
 
 class BehaviourBank(nn.Module):
-    """Behaviours by name, each learned from its own demonstrations, in the order in which they were learned.
+    """A mapping from names to behaviours, in the order in which they were learned.
 
-    They share the codebooks of `space`, so that their programs can be added.
+    All behaviours share the codebooks of `space`, so that their programs can be added.
     """
 
     def __init__(self, space: Space) -> None:
         super().__init__()
         self.space = space
-        # By number, since modules cannot have every name that a behaviour can.
+        # A list, since submodules cannot have every name that a behaviour can.
         self._names: list[str] = []
         self._behaviours = nn.ModuleList()
 
     def learn(
-        self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = silent
+        self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = no_progress
     ) -> LearningReport:
-        """Learn a behaviour (with `Gradient()`, if no rule is given) and keep it under `name`.
+        """Learn a behaviour and keep it under `name`, where it replaces an existing one.
 
-        An existing behaviour of that name is replaced. Says what the rule did with the samples; `progress` is called
-        with the share of the work that is done.
+        Args:
+            name: Any string that is not empty.
+            demonstrations: What to learn.
+            rule: The learning rule; by default `Gradient()`.
+            progress: Called with the completed fraction of the work, from 0 to 1.
+
+        Returns:
+            What the rule did with the samples.
         """
         check_name(name)
         rule = Gradient() if rule is None else rule
-        check_rule(rule)
+        require_rule(rule)
         behaviour = rule.fit(self.space, demonstrations, progress)
         self.add(name, behaviour)
         return behaviour.report
 
     def partial_fit(
-        self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = silent
+        self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = no_progress
     ) -> LearningReport:
-        """Go on learning the behaviour `name` from a further piece of demonstration, or begin it with its first.
+        """Learn further demonstrations with the behaviour `name`, or the first ones if there is none of that name.
 
-        Says what became of all pieces so far. `progress` is called with the share of the work that is done. Raises
-        `ValueError` for rules that cannot go on, see `Rule.partial_fit`.
+        Args:
+            name: The name of the behaviour.
+            demonstrations: The further demonstrations.
+            rule: The learning rule, which may differ from earlier ones.
+            progress: Called with the completed fraction of the work, from 0 to 1.
+
+        Returns:
+            What became of the samples of all calls so far.
+
+        Raises:
+            ValueError: If the rule cannot continue from a behaviour, see `Rule.partial_fit`.
         """
-        check_rule(rule)
+        require_rule(rule)
         if name not in self:
             return self.learn(name, demonstrations, rule, progress)
         behaviour = rule.partial_fit(self[name], demonstrations, progress)
@@ -67,14 +82,14 @@ class BehaviourBank(nn.Module):
     def add(self, name: str, behaviour: Behaviour) -> None:
         """Keep a behaviour that was learned over this bank's space, or over one with equal codebooks.
 
-        What comes from an equal space (a copy, another process) answers by this bank's codebooks from now on. Raises
+        A behaviour over an equal space (a copy, or of another process) is kept as one over this bank's space. Raises
         `ValueError` for a behaviour over other codebooks.
         """
         check_name(name)
         if not self.space.same_as(behaviour.space):
             raise ValueError(
-                f"behaviour {name!r} was learned over another space (other sensors, codes or seed); its program "
-                "cannot join this bank"
+                f"behaviour {name!r} was learned over another space (other sensors, codes or seed), so "
+                "that it cannot join this bank"
             )
         if behaviour.space is not self.space:
             behaviour = behaviour.over(self.space)
@@ -85,42 +100,38 @@ class BehaviourBank(nn.Module):
             self._names.append(name)
             self._behaviours.append(behaviour)
 
-    # -- asking all ---------------------------------------------------------------------------------------
-
     def forward(self, readings: Any) -> dict[str, Recall]:
-        """What every behaviour answers, by name, to readings `[B, n]`; see `Behaviour`. Conditions are encoded once."""
+        """The answer of each behaviour to readings `[B, n]`, by name. Conditions are encoded once."""
         return self.answer(self.space.cells(readings))
 
     def start(self, episodes: Sized) -> Any:
-        """See `Controller.start`."""
+        """The state before the first step of these episodes, see `Controller.start`."""
         return self.space.start(len(episodes))
 
     def step(self, readings: Any, state: Any) -> tuple[dict[str, Recall], Any]:
-        """See `Controller.step`: one answer per behaviour, by name."""
+        """The answer of each behaviour by name, and the next state; see `Controller.step`."""
         cells, state = self.space.step(readings, state)
         return self.answer(cells), state
 
     def answer(self, cells: Shaped[Tensor, "batch w"]) -> dict[str, Recall]:
-        """What every behaviour answers to cells as `Space.cells` returns them."""
+        """The answer of each behaviour, by name, to cells as `Space.cells` returns them."""
         if not len(self):
             return {}
-        recall = asked_once(partial(by_blocks, self._ask_all, row_bytes=8 * self.space.vsa.dim), cells)
-        blind = (cells < 0).all(-1)
+        recall = over_unique_rows(partial(by_blocks, self._query_all, row_bytes=8 * self.space.vsa.dim), cells)
+        unobserved = (cells < 0).all(-1)
         commands, similarity, margin, familiarity, _ = recall
-        # One behaviour after the other, in the second dimension.
+        # The second dimension is that of the behaviours.
         columns = zip(*(field.unbind(1) for field in (commands, similarity, margin, familiarity)), strict=True)
-        return {name: Recall(*column).blank(blind) for name, column in zip(self, columns, strict=True)}
+        return {name: Recall(*column).mask_unobserved(unobserved) for name, column in zip(self, columns, strict=True)}
 
-    def _ask_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
+    def _query_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         conditions = self.space.encode(cells)
-        answers = [self[name].ask(conditions) for name in self]
+        answers = [self[name].query(conditions) for name in self]
         return Recall(*(torch.stack([getattr(answer, f) for answer in answers], 1) for f in Recall._fields[:4]))
-
-    # -- as a mapping -------------------------------------------------------------------------------------
 
     @property
     def names(self) -> list[str]:
-        """The names, in the order in which they were learned."""
+        """The names of the behaviours, in the order in which they were learned."""
         return list(self._names)
 
     def __getitem__(self, name: str) -> Behaviour:
@@ -142,43 +153,41 @@ class BehaviourBank(nn.Module):
         head = f"d={self.space.vsa.dim}, {len(schema.sensors)} sensors, {len(schema.actuators)} actuators"
         return "\n  ".join([f"BehaviourBank({head})", *(repr(self[name]) for name in self)])
 
-    # -- files --------------------------------------------------------------------------------------------
-
     def save(self, path: str | Path) -> Path:
-        """Write codebooks and programs to one safetensors file, whole or not at all.
+        """Write codebooks and programs to one safetensors file, completely or not at all.
 
         The same bank gives the same bytes. Raises `ValueError` for what `load` would refuse: programs that are not
-        finite, codebooks of another type than the architecture's (after `.half()`).
+        finite, and codebooks of another type than the architecture's (as after `.half()`).
         """
         space = self.space.config()
         tensors = {f"space.{key}": value for key, value in self.space.state_dict().items()}
         check_layout(tensors, _codebooks(space))
         for number, name in enumerate(self):
             behaviour = self[name]
-            with naming(f"behaviour {name!r}"):
+            with error_context(f"behaviour {name!r}"):
                 behaviour.check()
             parts = {"program": behaviour.program, "known": behaviour.known, "results": behaviour.results}
             tensors |= {f"behaviours.{number}.{key}": tensor for key, tensor in parts.items()}
-        behaviours = [_described(name, self[name]) for name in self]
+        behaviours = [_entry(name, self[name]) for name in self]
         return save_tensors(path, "bank", tensors, {"space": space, "behaviours": behaviours})
 
     @classmethod
     def load(cls, path: str | Path) -> "BehaviourBank":
-        """Read what `save` wrote.
+        """Read a file that `save` wrote.
 
-        Everything is compared with the description before anything is made. Raises `ValueError` that names the file
-        and what in it is wrong.
+        All tensors are compared with the description before any object is created. Raises `ValueError` that names the
+        file and what in it is wrong.
         """
         tensors, about = load_tensors(path, "bank")
-        with naming(f"{path} does not describe a bank of this version"):
-            with naming("behaviours"):
+        with error_context(f"{path} does not describe a bank of this version"):
+            with error_context("behaviours"):
                 entries = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
                 terms = [entry.get("terms") for entry in about["behaviours"]]
                 for name, _ in entries:
                     check_name(name)
                 if len({name for name, _ in entries}) < len(entries):
                     raise ValueError("two of them have the same name")
-            with naming("space"):
+            with error_context("space"):
                 codebooks = _codebooks(about["space"])
                 check_layout(
                     {name: tensor for name, tensor in tensors.items() if not name.startswith("behaviours.")}, codebooks
@@ -186,18 +195,18 @@ class BehaviourBank(nn.Module):
             parts = {f"behaviours.{number}.{key}" for number in range(len(entries)) for key in _PARTS}
             if wrong := sorted(parts ^ (tensors.keys() - codebooks.keys())):
                 raise ValueError(f"tensor {wrong[0]!r} is {'missing' if wrong[0] in parts else 'not described'}")
-            with naming("space"):
+            with error_context("space"):
                 space = Space.from_config(
                     about["space"], {name.removeprefix("space."): tensors[name] for name in codebooks}
                 )
             bank = cls(space)
             for number, (name, report) in enumerate(entries):
-                with naming(f"behaviour {name!r}"):
+                with error_context(f"behaviour {name!r}"):
                     program, known, results = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
                     behaviour = Behaviour(space, program, known, results, report)
                     if terms[number] is not None:
-                        made_of = terms_from(terms[number], behaviour.results)
-                        behaviour = Behaviour(space, program, known, results, report, made_of)
+                        parsed = terms_from_dicts(terms[number], behaviour.results)
+                        behaviour = Behaviour(space, program, known, results, report, parsed)
                 bank.add(name, behaviour)
         return bank
 
@@ -206,16 +215,16 @@ _PARTS = ("program", "known", "results")
 
 
 def _codebooks(config: dict[str, Any]) -> Layout:
-    return {f"space.{name}": wanted for name, wanted in Space.layout(config).items()}
+    return {f"space.{name}": spec for name, spec in Space.layout(config).items()}
 
 
-def _described(name: str, behaviour: Behaviour) -> dict[str, Any]:
+def _entry(name: str, behaviour: Behaviour) -> dict[str, Any]:
     entry = {"name": name, "report": behaviour.report.to_dict()}
-    # Of a behaviour that is no sum, all is said.
-    return entry | ({"terms": described(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
+    # A behaviour that is no sum has no terms to write.
+    return entry | ({"terms": terms_to_dicts(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
 
 
 def check_name(name: object) -> None:
-    """Raise `ValueError` unless `name` can name a behaviour: any text but the empty one."""
+    """Raise `ValueError` unless `name` is a string that is not empty."""
     if not isinstance(name, str) or not name:
         raise ValueError(f"a behaviour's name is a text that is not empty; got {name!r}")

@@ -1,4 +1,4 @@
-"""One learned behaviour: a program of d numbers, and what it takes to ask it."""
+"""A learned behaviour: a program, and the results that it can recall."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,11 +9,11 @@ import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
-from behaviours.algebra import Term, added, checked_weight, report_of, results_of, weighted_sum
+from behaviours.algebra import Term, checked_weight, merge_terms, merged_report, merged_results, weighted_sum
 from behaviours.controller import Controller
 from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
-from behaviours.recall import Recall, recalled
+from behaviours.recall import Recall, answer_conditions
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Sensor
 from behaviours.space import Space
@@ -24,20 +24,20 @@ from torchvsa._numerics import as_bipolar, is_integer
 
 
 class Behaviour(Controller):
-    """A behaviour as one hypervector, `program` `[d]`; called with readings `[B, n]` it answers with commands.
+    """A behaviour as one hypervector, `program` `[d]`, which maps readings `[B, n]` to commands.
 
-    `known` `[d]` is the sum of the conditions that it knows; both are raw accumulators, see `clipped`. `memory`
-    holds the results that it can answer with.
+    `known` `[d]` is the sum of the known conditions. Both are raw accumulators, see `clipped`. `memory` holds the
+    results that can be recalled.
 
-    Behaviours over one space add up to behaviours:
+    A weighted sum of behaviours over one space is a behaviour:
 
         both = seek + 2 * avoid
-        both - avoid            # the program of seek + avoid, bit for bit if programs are integers
-        -flee                   # answers what flee answers least
+        both - avoid            # the program of seek + avoid; the same bits if programs are integers
+        -flee                   # recalls the result that scores lowest for flee
 
-    Program and known conditions are the weighted sums of theirs. A sum answers with the results of all its `terms`, and
-    what is taken away as often as it was added is gone, with the results that only it had. The scores of a sum are the
-    weighted sums of the scores (`scores`), so that adding is voting.
+    Programs and known conditions are added, and so are the scores of each result (`scores`): adding is voting. A sum
+    recalls the results of all its `terms`. A term whose weights add up to 0 is removed, with the results that only it
+    had.
 
     Source: Neubert et al. 2016, Algorithm 2; sums of programs, section V.
     """
@@ -60,7 +60,7 @@ class Behaviour(Controller):
         self.space = space
         self.report = report
         self.name = ""
-        """The name under which a bank keeps it."""
+        """The name of the behaviour in its bank."""
         self._terms = tuple(terms)
         if isinstance(program, nn.Parameter):
             self.register_parameter("program", program)
@@ -70,24 +70,22 @@ class Behaviour(Controller):
         self.memory = ResultMemory(space, results)
 
     def check(self) -> None:
-        """Raise `ValueError` naming what could not be kept: see `BehaviourBank.save`."""
+        """Raise `ValueError` unless the behaviour can be saved, see `BehaviourBank.save`."""
         for name in ("program", "known"):
             _check_vector(self.space.vsa, name, getattr(self, name))
         check_levels(self.space.schema, self.results)
 
     def over(self, space: Space) -> "Behaviour":
-        """The same behaviour over a space with equal codebooks, on its device."""
+        """The same behaviour over another space with equal codebooks, on the device of that space."""
         device = space.device
         program = self.program.detach().to(device)
         if isinstance(self.program, nn.Parameter):
             program = nn.Parameter(program)
         return Behaviour(space, program, self.known.to(device), self.results.to(device), self.report, self._terms)
 
-    # -- sums ---------------------------------------------------------------------------------------------
-
     @property
     def terms(self) -> tuple[Term, ...]:
-        """The learned behaviours of which it is a weighted sum; itself, if it is none."""
+        """The learned behaviours of a weighted sum; of a learned behaviour, the behaviour itself."""
         if self._terms:
             return self._terms
         tensors = {"program": self.program.detach(), "known": self.known, "results": self.results}
@@ -96,31 +94,36 @@ class Behaviour(Controller):
 
     @classmethod
     def sum(cls, behaviours: Sequence["Behaviour"], weights: Sequence[float] | None = None) -> "Behaviour":
-        """The weighted sum of behaviours over equal spaces, exact where programs and weights are whole.
+        """The weighted sum of behaviours over equal spaces; exact if programs and weights are integers.
 
-        Raises `ValueError` for behaviours over different codebooks, for weights that are no finite numbers, and if
-        nothing is left: everything cancels, or all weights are 0.
+        Args:
+            behaviours: The behaviours to add.
+            weights: One finite number per behaviour; by default all are 1.
+
+        Raises:
+            ValueError: For behaviours over different codebooks, for weights that are not finite, and if no term is left
+                because all weights are 0 or all terms cancel.
         """
         weights = [checked_weight(weight) for weight in ([1] * len(behaviours) if weights is None else weights)]
-        held = [(part, weight) for part, weight in zip(behaviours, weights, strict=True) if weight]
-        if not held:
+        weighted = [(part, weight) for part, weight in zip(behaviours, weights, strict=True) if weight]
+        if not weighted:
             raise ValueError("a sum of behaviours needs at least one with a weight that is not 0")
-        space = held[0][0].space
-        if not all(space.same_as(part.space) for part, _ in held):
+        space = weighted[0][0].space
+        if not all(space.same_as(part.space) for part, _ in weighted):
             raise ValueError("behaviours over different spaces (other sensors, codes or seeds) do not add up")
-        terms = added([replace(t, weight=weight * t.weight) for part, weight in held for t in part.terms])
+        terms = merge_terms([replace(t, weight=weight * t.weight) for part, weight in weighted for t in part.terms])
         if not terms:
-            raise ValueError("nothing is left of this sum: its behaviours cancel each other")
-        parts, weights = [part.over(space) for part, _ in held], [weight for _, weight in held]
+            raise ValueError("the behaviours of this sum cancel each other, so that no term is left")
+        parts, weights = [part.over(space) for part, _ in weighted], [weight for _, weight in weighted]
         program = weighted_sum(space.vsa, weights, [part.program.detach() for part in parts])
         known = weighted_sum(space.vsa, weights, [part.known for part in parts])
-        return cls(space, program, known, results_of(terms).to(space.device), report_of(terms), terms)
+        return cls(space, program, known, merged_results(terms).to(space.device), merged_report(terms), terms)
 
     def __add__(self, other: object) -> "Behaviour":
         return Behaviour.sum([self, other]) if isinstance(other, Behaviour) else NotImplemented
 
     def __radd__(self, other: object) -> "Behaviour":
-        # `sum` of Python begins with 0.
+        # Python's `sum` starts with 0.
         return self if isinstance(other, int) and other == 0 else NotImplemented
 
     def __sub__(self, other: object) -> "Behaviour":
@@ -137,56 +140,54 @@ class Behaviour(Controller):
     def __truediv__(self, weight: Any) -> "Behaviour":
         return self * (1 / weight) if isinstance(weight, Real) else NotImplemented
 
-    # -- answers ------------------------------------------------------------------------------------------
-
     @property
     def results(self) -> Int64[Tensor, "k m"]:
         """The stored results as levels of the actuators, in order of first insertion."""
         return self.memory.levels
 
     def readout(self) -> Readout:
-        """The program, ready to be asked for each of `results`: see `VSA.readout`."""
+        """The scores of all `results` as a function of conditions, see `VSA.readout`."""
         return self.space.vsa.readout(self.program, self.memory.current_items())
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         readout = self.readout()
-        # Some rows at a time go all the way, so that their conditions, in float64, never leave the cache.
+        # Each block of rows is processed to the end, so that its conditions, in float64, stay in the cache.
         return by_blocks(
-            lambda rows: recalled(readout, self.known, self.memory.commands, self.space.encode(rows)),
+            lambda rows: answer_conditions(readout, self.known, self.memory.commands, self.space.encode(rows)),
             cells,
             row_bytes=8 * self.space.vsa.dim,
         )
 
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """Answer conditions that are encoded and protected already (Algorithm 2, lines 2 to 8)."""
-        return recalled(self.readout(), self.known, self.memory.commands, conditions)
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+        """The answer to encoded and protected conditions (Algorithm 2, lines 2 to 8)."""
+        return answer_conditions(self.readout(), self.known, self.memory.commands, conditions)
 
     def freeze(self) -> FrozenBehaviour:
-        """The read-only form, fastest to ask: see `FrozenBehaviour`."""
+        """A read-only copy with the fastest recall, see `FrozenBehaviour`."""
         readout = self.space.vsa.readout(self.program.detach(), self.memory.current_items())
         return FrozenBehaviour(self.space, readout, self.known, self.memory.commands)
 
     def scores(self, readings: Any) -> Float[Tensor, "batch k"]:
-        """What recall compares: how strongly each of `results` is answered, `<unbind(program, c), item> / |item|`.
+        """The score of each of `results`, `<unbind(program, condition), item> / |item|`, which recall compares.
 
-        In float64, and differentiable by the program, see `trainable`.
+        In float64, and differentiable with respect to the program, see `trainable`.
         """
         return self.readout()(self.space.encode(self.space.cells(readings)))
 
     def labels(self, commands: Any) -> Int64[Tensor, "batch"]:
-        """Where each row of commands `[B, m]` stands in `results`; raises `ValueError` if it is not stored."""
+        """The index in `results` of each row of commands `[B, m]`. Raises `ValueError` if it is not stored."""
         levels = self.space.schema.command_levels(commands).to(self.results.device)
         same = (levels[:, None] == self.results).all(-1)
         if not same.any(-1).all():
             row = int((~same.any(-1)).nonzero()[0])
             raise ValueError(
-                f"row {row} asks for levels {levels[row].tolist()}, which are none of the {len(self.results)} stored "
-                "results; learn a demonstration that holds them first"
+                f"row {row} has the levels {levels[row].tolist()}, which are none of the {len(self.results)} stored "
+                "results; first learn a demonstration that contains them"
             )
         return same.to(torch.int8).argmax(-1)
 
     def trainable(self) -> "Behaviour":
-        """A copy over the same space whose program is a float `nn.Parameter`, for an ordinary training loop.
+        """A copy over the same space whose program is a float `nn.Parameter`, for a PyTorch training loop.
 
             behaviour = bank["seek_light"].trainable()
             labels = behaviour.labels(shown.commands)
@@ -198,19 +199,19 @@ class Behaviour(Controller):
                 optimiser.step()
             bank.add("seek_light", behaviour)
 
-        It is a behaviour like any other: asked, copied, saved in a bank, exported. (A bank file holds its program as a
-        tensor; what is loaded from one can be made trainable again.)
+        It can be called, copied, saved and exported like any behaviour. A bank file holds its program as a plain
+        tensor: call `trainable` again after loading.
         """
         program = as_bipolar(self.program).detach()
-        wide = torch.float32 if is_integer(program) else program.dtype
-        parameter = nn.Parameter(program.to(wide, copy=True))
+        dtype = torch.float32 if is_integer(program) else program.dtype
+        parameter = nn.Parameter(program.to(dtype, copy=True))
         return Behaviour(self.space, parameter, self.known.clone(), self.results.clone(), self.report)
 
     def clipped(self) -> "Behaviour":
-        """A copy whose program and known conditions are hypervectors of the architecture, not raw sums.
+        """A copy whose program and known conditions are normalised hypervectors instead of raw sums.
 
-        Clipping loses the counts: a program of many pairs recalls far fewer of them afterwards. Integer codes take the
-        nearest of -1, 0 and +1, so that a program of fractions far below 1 (`LeastSquares`) is lost in them.
+        Clipping loses the counts: a program of many pairs then recalls far fewer of them. Integer codes are rounded to
+        -1, 0 or +1, which turns programs with elements far below 1 (`LeastSquares`) into 0.
         """
         vsa = self.space.vsa
         program = vsa.normalize(self.program.detach())
@@ -219,15 +220,15 @@ class Behaviour(Controller):
     def __repr__(self) -> str:
         schema, report = self.space.schema, self.report
         name = f"{self.name!r}, " if self.name else ""
-        made = f"sum of {', '.join(report.terms)}" if report.terms else f"{report.rule}, {report.pairs} pairs"
+        origin = f"sum of {', '.join(report.terms)}" if report.terms else f"{report.rule}, {report.pairs} pairs"
         return (
-            f"Behaviour({name}d={self.space.vsa.dim}, {listed('sensors', schema.sensors)}, "
-            f"{listed('actuators', schema.actuators)}, {made}, {len(self.results)} results)"
+            f"Behaviour({name}d={self.space.vsa.dim}, {name_list('sensors', schema.sensors)}, "
+            f"{name_list('actuators', schema.actuators)}, {origin}, {len(self.results)} results)"
         )
 
 
-def listed(what: str, parts: Sequence[Sensor] | Sequence[Actuator], most: int = 6) -> str:
-    """How many there are, and the names of the first of them."""
+def name_list(what: str, parts: Sequence[Sensor] | Sequence[Actuator], most: int = 6) -> str:
+    """The number of sensors or actuators, and the names of the first few."""
     names = ", ".join(part.name for part in parts[:most]) + (", ..." if len(parts) > most else "")
     return f"{len(parts)} {what} ({names})"
 
@@ -236,7 +237,7 @@ _REAL = (torch.int8, torch.int32, torch.int64, torch.float32, torch.float64)
 
 
 def _check_vector(vsa: VSA, name: str, vector: Tensor) -> None:
-    """Raise unless `vector` can be a program, or a sum of conditions, of this architecture."""
+    """Raise `ValueError` unless `vector` can be a program, or a sum of conditions, of this architecture."""
     if vector.shape != (vsa.dim,):
         raise ShapeError(f"{name} must be one hypervector [{vsa.dim}]; got shape {tuple(vector.shape)}")
     kinds = (torch.complex64, torch.complex128) if vsa.dtype.is_complex else (*_REAL, vsa.dtype)

@@ -1,4 +1,4 @@
-"""What drives a robot: readings in, a `Recall` out, one control step after the other."""
+"""The interface of everything that drives a robot: readings in, a `Recall` out, step by step."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sized
@@ -7,16 +7,16 @@ from typing import Any
 from jaxtyping import Shaped
 from torch import Tensor, nn
 
-from behaviours.recall import Recall, asked_once
+from behaviours.recall import Recall, over_unique_rows
 from behaviours.space import Space
 
 
 class Controller(nn.Module, ABC):
-    """The interface of behaviours, and of policies that combine them.
+    """The base class of behaviours, and of policies that combine them.
 
-    Called with readings `[B, n]` it answers each row by itself. Where conditions hold a memory of past readings
-    (`torchvsa.encoders.History`), or a policy has a state of its own, `start` and `step` hand it on explicitly, as a
-    PyTorch RNN cell does:
+    Called with readings `[B, n]`, it answers each row independently. If conditions contain past readings
+    (`torchvsa.encoders.History`), or if a policy has a state, `start` and `step` pass that state explicitly, as with a
+    PyTorch RNN cell:
 
         state = controller.start(episodes)
         recall, state = controller.step(readings, state)
@@ -29,8 +29,8 @@ class Controller(nn.Module, ABC):
     def forward(self, readings: Any) -> Recall:
         """Commands `[B, m]` for readings `[B, n]`, with similarity, margin and familiarity (see `Recall`).
 
-        Raises an error that names sensor, row and range for readings that are not valid. A graph (`torch.compile`,
-        `torch.export`) takes readings as a tensor and cannot raise: there, those out of range are clipped.
+        Raises `ValueError` that names sensor, row and range for invalid readings. A compiled or exported graph takes
+        readings as a tensor and cannot raise; there, readings out of range are clipped.
         """
         return self.answer(self.space.cells(readings))
 
@@ -39,14 +39,14 @@ class Controller(nn.Module, ABC):
         return self.space.start(len(episodes))
 
     def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
-        """Commands for the readings `[B, n]` of the next step, and the state after it."""
+        """The answer to the readings `[B, n]` of the next step, and the state after it."""
         cells, state = self.space.step(readings, state)
         return self.answer(cells), state
 
     def answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        """Commands for cells as `Space.cells` returns them; NaN commands where no sensor was observed."""
-        return asked_once(self._answer, cells).blank((cells < 0).all(-1))
+        """The answer to cells as `Space.cells` returns them; commands are NaN where no sensor was observed."""
+        return over_unique_rows(self._answer, cells).mask_unobserved((cells < 0).all(-1))
 
     @abstractmethod
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        """Commands for cells of which at least one in each row was observed."""
+        """The answer to cells; rows in which no sensor was observed are masked afterwards."""

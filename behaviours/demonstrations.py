@@ -1,4 +1,4 @@
-"""Demonstrations: what was sensed and what was done about it."""
+"""Demonstrations: recorded readings, and the commands that answered them."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -11,24 +11,27 @@ from torch import Tensor
 
 from behaviours.schema import Schema
 from behaviours.storage import load_tensors, save_tensors
-from behaviours.tables import ReadText, checked_names, column_names, compare_names, mask, numbers, whole_numbers
+from behaviours.tables import ReadText, checked_names, column_names, compare_names, to_float64, to_int64, to_mask
 from torchvsa import ShapeError
 
 
 class Demonstrations:
     """Pairs of sensor readings `[N, n]` and motor commands `[N, m]`, in the order in which they were shown.
 
-    Takes tensors, arrays, lists, or data frames (a series is one column), and copies them. `episodes` `[N]` says which
-    run each row comes from (all from run 0, if left out). NaN readings were not observed.
+    Args:
+        sensors: The readings, as a tensor, array, list or data frame (a series is one column), which is copied. NaN
+            means not observed.
+        commands: The commands, likewise.
+        episodes: The number of the run of each row, `[N]`; by default all rows are of run 0.
+        sensor_names: The names of the columns of `sensors`; by default those of the data frame, if it is one. Learning
+            compares them with the schema.
+        actuator_names: The names of the columns of `commands`, likewise.
+        schema: With a schema, readings of categorical sensors may be text, which is stored as its index (see
+            `Schema.numeric`), and all values are checked immediately; without one, learning checks them.
 
-    With a `schema`, readings of categorical sensors may be text, which is kept as its index among their values (see
-    `Schema.numeric`), and everything is compared with the schema at once; without, learning does so.
-
-    `sensor_names` and `actuator_names`, tuples or None, are the names of the columns: those of the data frames, unless
-    given. Where there are any, learning compares them with those of the schema.
-
-    Raises `ValueError` for no rows, unequal numbers of rows, infinite readings, infinite or NaN commands, episodes
-    that are no whole numbers, and whatever is not real numbers.
+    Raises:
+        ValueError: For no rows, unequal numbers of rows, infinite readings, infinite or NaN commands, episodes that are
+            not whole numbers, and values that are not real numbers.
     """
 
     def __init__(
@@ -53,7 +56,7 @@ class Demonstrations:
             raise ValueError("a demonstration needs at least one row; this one is empty")
         if episodes is None:
             episodes = torch.zeros(count)
-        self.episodes: Int64[Tensor, "N"] = whole_numbers(episodes, "episodes").clone()
+        self.episodes: Int64[Tensor, "N"] = to_int64(episodes, "episodes").clone()
         if self.episodes.dim() != 1:
             raise ShapeError(f"episodes must be one number per row, [N]; got shape {tuple(self.episodes.shape)}")
         for name, rows in (("commands", self.commands), ("episodes", self.episodes)):
@@ -80,27 +83,27 @@ class Demonstrations:
         )
 
     def check(self, schema: Schema) -> None:
-        """Raise unless the columns are those of `schema` and every value is in range."""
+        """Raise `ValueError` unless the columns are those of `schema` and every value is in range."""
         self.check_names(schema)
         schema.check_readings(self.sensors)
         schema.command_levels(self.commands)
 
     def check_names(self, schema: Schema) -> None:
-        """Raise `ValueError` if columns have names that are not those of `schema` in the same order."""
+        """Raise `ValueError` if columns have names that differ from those of `schema`, or are in another order."""
         schema.check_names(self.sensor_names, self.actuator_names)
 
     def where(self, keep: Any) -> "Demonstrations":
         """The rows for which `keep` `[N]`, one boolean per row, is true. Raises `ValueError` for anything else."""
-        # Readings and episodes may be on different devices; an index from the CPU suits both.
-        chosen = mask(keep, len(self), "keep").cpu()
+        # Readings and episodes may be on different devices; an index on the CPU works for both.
+        chosen = to_mask(keep, len(self), "keep").cpu()
         rows = self.sensors[chosen], self.commands[chosen], self.episodes[chosen]
         return Demonstrations(*rows, sensor_names=self.sensor_names, actuator_names=self.actuator_names)
 
     @staticmethod
     def join(parts: Iterable["Demonstrations"]) -> "Demonstrations":
-        """Several demonstrations one after the other, with their episode numbers as they are.
+        """Concatenate demonstrations; episode numbers are kept.
 
-        Raises `ValueError` for none at all, and for parts with different columns or names of columns.
+        Raises `ValueError` for no demonstrations, and for different columns or names of columns.
         """
         parts = list(parts)
         if not parts:
@@ -120,14 +123,14 @@ class Demonstrations:
         return Demonstrations(*joined, sensor_names=first.sensor_names, actuator_names=first.actuator_names)
 
     def save(self, path: str | Path) -> Path:
-        """Write to one safetensors file, whole or not at all."""
+        """Write to one safetensors file, completely or not at all."""
         tensors = {"sensors": self.sensors, "commands": self.commands, "episodes": self.episodes}
         names = {key: list(value) for key, value in self._names().items() if value is not None}
         return save_tensors(path, "demonstrations", tensors, {"rows": len(self), **names})
 
     @classmethod
     def load(cls, path: str | Path) -> "Demonstrations":
-        """Read what `save` wrote. Raises `ValueError`, naming the file, for anything else."""
+        """Read a file that `save` wrote. Raises `ValueError`, naming the file, for anything else."""
         tensors, about = load_tensors(path, "demonstrations")
         try:
             _check_file(tensors, about)
@@ -145,19 +148,19 @@ _NAMES = ("sensor_names", "actuator_names")
 
 
 def _refuse_text(table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    for place, value in np.ndenumerate(table):
+    for index, value in np.ndenumerate(table):
         if isinstance(value, str):
-            row = f" in row {place[0]}" if place else ""
+            row = f" in row {index[0]}" if index else ""
             raise ValueError(
-                f"sensors must be real numbers; got the text {str(value)!r:.80}{row} (with schema=, the text of "
-                "categorical sensors is read)"
+                f"sensors must be real numbers; got the text {str(value)!r:.80}{row} (give schema= to read the "
+                "text of categorical sensors)"
             )
     return table
 
 
 def _table(values: Any, name: str, read_text: ReadText | None = None) -> Float64[Tensor, "N columns"]:
-    """A copy of a table, in which a series is one column."""
-    rows = numbers(values, name, read_text).detach()
+    """A copy of a table as a tensor; a series becomes one column."""
+    rows = to_float64(values, name, read_text).detach()
     if rows.dim() == 1 and hasattr(values, "to_numpy"):
         rows = rows[:, None]
     if rows.dim() != 2 or rows.shape[1] == 0:
@@ -167,7 +170,7 @@ def _table(values: Any, name: str, read_text: ReadText | None = None) -> Float64
 
 
 def _names(values: Any, rows: Tensor, given: Sequence[str] | None, what: str) -> tuple[str, ...] | None:
-    """The names of the columns: those `given`, which those of a data frame must equal."""
+    """The names of the columns: those `given`, which must equal those of a data frame."""
     found = column_names(values)
     if given is None:
         return found
@@ -187,7 +190,7 @@ def _check_file(tensors: dict[str, Tensor], about: Any) -> None:
         if tensors[name].dtype != dtype:
             raise ValueError(f"{name} must be of type {dtype}; got {tensors[name].dtype}")
     if not isinstance(about, dict) or not set(about) <= {"rows", *_NAMES}:
-        raise ValueError(f"its description must hold nothing but rows, {', '.join(_NAMES)}; got {about!r:.200}")
+        raise ValueError(f"its description must contain only rows, {', '.join(_NAMES)}; got {about!r:.200}")
     rows = about.get("rows", len(tensors["sensors"]) if tensors["sensors"].dim() else 0)
     if type(rows) is not int or tensors["sensors"].shape[:1] != (rows,):
         raise ValueError(f"rows is {rows!r:.200}, but sensors has shape {tuple(tensors['sensors'].shape)}")

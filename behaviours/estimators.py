@@ -1,7 +1,6 @@
-"""Estimators for scikit-learn: one hypervector that classifies, and one that interpolates.
+"""Scikit-learn estimators: a classifier and a regressor, each of which is one hypervector.
 
-With their base, `behaviours.quantiles`, the only modules of the behaviours that need scikit-learn; `behaviours` loads
-them when they are asked for.
+This module and `behaviours.quantiles`, its base, need scikit-learn; `behaviours` imports them on first access.
 """
 
 import sys
@@ -18,8 +17,8 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import Gradient, no_convergence_warnings
-from behaviours.learning.least_squares import solve
-from behaviours.progress import between
+from behaviours.learning.least_squares import check_ridge, solve
+from behaviours.progress import subrange
 from behaviours.quantiles import QuantileEncoding
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator
@@ -29,25 +28,26 @@ from behaviours.space import Space
 class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     """Classify rows of readings `[N, n]` with one hypervector of `dim` numbers.
 
-    Each feature is a sensor, binned at the quantiles of its training values; each dimension of a condition
-    asks whether a random few of the sensors (at most `subset`) lie above thresholds of their own, and binds the
-    answers. The classes are random hypervectors. The program alone is trained on the labels, by
-    `Gradient(sparse=True)`: class j scores `<condition ⊗ program, class_j>`. NaN is not observed, and left out;
-    values beyond those of the training rows count as the nearest of them.
+    Each feature is a sensor, binned at the quantiles of its training values. Each dimension of a condition compares a
+    few random sensors (at most `subset`) with random thresholds, and binds the outcomes. The classes are random
+    hypervectors. Only the program is trained, by `Gradient(sparse=True)`: class j scores
+    `<condition ⊗ program, class_j>`. NaN means not observed, and is left out; values outside the range of the training
+    rows are clipped to it.
 
     | parameter | meaning |
     |---|---|
     | `dim` | elements of the program |
-    | `bins` | quantile bins per feature, at most; their edges take features · bins floats |
-    | `subset` | most features that interact in one dimension |
-    | `passes`, `batch`, `learning_rate` | of the gradient descent |
-    | `random_state` | seeds codebooks and batches |
-    | `verbose` | 1 prints now and then which share of the training is done |
+    | `bins` | the most quantile bins per feature; their edges take features · bins floats |
+    | `subset` | the most features that interact in one dimension |
+    | `epochs`, `batch_size`, `learning_rate` | of the gradient descent |
+    | `random_state` | the seed of codebooks and batches |
+    | `verbose` | 1 prints the progress of the training |
 
-    The codebook takes about 17 · `subset` · `dim` bytes, however many bins and features there are. A `fit` or
-    `partial_fit` that fails leaves the estimator as it was.
+    The codebook takes about 17 · `subset` · `dim` bytes, for any number of bins and features. If `fit` or `partial_fit`
+    fails, the estimator is not changed.
 
-    Fitted: `classes_` `[K]`, `behaviour_` (a `Behaviour`; its `program` is the hypervector), `n_features_in_`.
+    Fitted attributes: `classes_` `[K]`, `behaviour_` (a `Behaviour`, whose `program` is the hypervector),
+    `n_features_in_`.
     """
 
     def __init__(
@@ -56,8 +56,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         *,
         bins: int = 4096,
         subset: int = 2,
-        passes: int = 100,
-        batch: int = 128,
+        epochs: int = 100,
+        batch_size: int = 128,
         learning_rate: float = 0.05,
         random_state: Any = None,
         verbose: int = 0,
@@ -65,8 +65,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         self.dim = dim
         self.bins = bins
         self.subset = subset
-        self.passes = passes
-        self.batch = batch
+        self.epochs = epochs
+        self.batch_size = batch_size
         self.learning_rate = learning_rate
         self.random_state = random_state
         self.verbose = verbose
@@ -75,8 +75,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     def fit(self, X: Any, y: Any) -> Self:  # noqa: N803 (scikit-learn's own name)
         """Train the program on rows `X` `[N, n]` and labels `y` `[N]`.
 
-        Raises `ValueError` for fewer than two classes, infinite values, rows without any value, features whose range is
-        no finite float, and parameters that cannot work.
+        Raises `ValueError` for fewer than two classes, infinite values, rows of NaN only, features whose range is no
+        finite float, and invalid parameters.
         """
         with self._all_or_nothing():
             self._check_parameters()
@@ -94,33 +94,33 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
 
     @no_convergence_warnings()
     def partial_fit(self, X: Any, y: Any, classes: Any = None) -> Self:  # noqa: N803
-        """Go on training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
+        """Continue training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
 
-        The edges of the bins come from the first batch: it should span the readings to come, since
-        values beyond it count as the nearest of them. Each call goes `passes` times through its own rows, and nothing
-        else reminds the program of earlier ones: with batches of one class each, take few passes.
+        The bin edges come from the first call, whose readings should span those of later calls, since values outside
+        their range are clipped to it. Each call trains for `epochs` on its rows alone, which may make the program
+        forget earlier rows: take few epochs if each call shows one class.
 
-        Raises `ValueError` for labels that are none of `classes`, and as `fit` does.
+        Raises `ValueError` for labels that are not in `classes`, and where `fit` does.
         """
         with self._all_or_nothing():
             self._check_parameters()
             first = not hasattr(self, "behaviour_")
             readings, y = self._checked(X, y, reset=first)
             check_classification_targets(y)
-            given = None if classes is None else np.unique(classes)
+            unique = None if classes is None else np.unique(classes)
             if first:
-                if given is None or len(given) < 2:
+                if unique is None or len(unique) < 2:
                     raise ValueError(
                         f"the first call of partial_fit needs all classes, at least 2; got classes={classes}"
                     )
-                self.classes_ = given
-            elif given is not None and not np.array_equal(given, self.classes_):
-                raise ValueError(f"classes are {self.classes_} since the first call; got {given}")
+                self.classes_ = unique
+            elif unique is not None and not np.array_equal(unique, self.classes_):
+                raise ValueError(f"classes are {self.classes_} since the first call; got {unique}")
             if len(unknown := np.setdiff1d(y, self.classes_)):
                 raise ValueError(f"y holds {unknown[0]!r}, which is none of the classes {self.classes_}")
-            before = self._blank(self._class_space(readings)) if first else self.behaviour_
+            before = self._untrained(self._class_space(readings)) if first else self.behaviour_
             labels = torch.from_numpy(np.searchsorted(self.classes_, y)[:, None])
-            # Another seed for each call, or all would visit their rows in the same order.
+            # Each call has another seed, so that it visits its rows in another order.
             rule = self._rule(before.space.seed + before.report.updates)
             shown = Demonstrations(torch.tensor(readings), labels)
             self.behaviour_ = rule.partial_fit(before, shown, self._progress())
@@ -128,65 +128,62 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
 
     def _check_parameters(self) -> None:
         super()._check_parameters()
-        self._whole("passes")
-        self._whole("batch")
-        if self._positive("learning_rate") > 1e30:
-            # The program is float32, and so are its steps.
-            raise ValueError(f"learning_rate must be a number of float32, at most 1e30; got {self.learning_rate!r}")
+        self._rule(seed=0)
 
     def _class_space(self, readings: Float64[np.ndarray, "N n"]) -> Space:
         count = len(self.classes_)
         return self._space(readings, [Actuator("class", 0, count - 1, levels=count)])
 
     def _rule(self, seed: int) -> Gradient:
-        passes, batch, rate = self._whole("passes"), self._whole("batch"), self._positive("learning_rate")
-        return Gradient(passes=passes, batch=batch, learning_rate=rate, sparse=True, seed=seed)
+        return Gradient(
+            epochs=self.epochs, batch_size=self.batch_size, learning_rate=self.learning_rate, sparse=True, seed=seed
+        )
 
-    def _blank(self, space: Space) -> Behaviour:
-        """The behaviour that knows all classes and no condition."""
+    def _untrained(self, space: Space) -> Behaviour:
+        """A behaviour that has all classes as results, and no known conditions."""
         zeros = torch.zeros(space.vsa.dim)
         known = zeros.to(space.vsa.accumulator)
         levels = torch.arange(len(self.classes_))[:, None]
-        return Behaviour(space, zeros, known, levels, LearningReport(Gradient.name, samples=0, new=0, passes=0))
+        return Behaviour(space, zeros, known, levels, LearningReport(Gradient.name, samples=0, new=0, epochs=0))
 
     def _scores(self, X: Any) -> Float64[np.ndarray, "N K"]:  # noqa: N803
         check_is_fitted(self)
         readings = self._checked(X, reset=False)
         behaviour = self.behaviour_
-        # In float64 a row scores the same, to all digits shown, whatever other rows it stands among.
+        # In float64 the scores of a row do not visibly depend on the other rows of the batch.
         readout = behaviour.readout().of(behaviour.program.double())
         rows = [readout(block) for block in self._conditions(behaviour.space, readings)]
-        # The clean-up memory is in order of first insertion, the columns in that of the classes.
+        # The clean-up memory is in order of first appearance, the columns in order of the classes.
         columns: Int64[Tensor, "K"] = behaviour.results[:, 0].argsort()
         return torch.cat(rows)[:, columns].numpy()
 
     def decision_function(self, X: Any) -> Float64[np.ndarray, "N ..."]:  # noqa: N803
-        """The score of each class, `[N, K]`; for two classes the second's lead over the first, `[N]`."""
-        answers = self._scores(X)
-        return answers[:, 1] - answers[:, 0] if len(self.classes_) == 2 else answers
+        """The score of each class, `[N, K]`; for two classes, the score of the second less that of the first, `[N]`."""
+        scores = self._scores(X)
+        return scores[:, 1] - scores[:, 0] if len(self.classes_) == 2 else scores
 
     def predict_proba(self, X: Any) -> Float64[np.ndarray, "N K"]:  # noqa: N803
-        """The softmax of the scores, by which the program was trained, `[N, K]`."""
+        """The softmax of the scores, `[N, K]`, which the loss of the training uses."""
         return torch.softmax(torch.from_numpy(self._scores(X)), 1).numpy()
 
     def predict(self, X: Any) -> Shaped[np.ndarray, "N"]:  # noqa: N803
-        """The class whose hypervector the answer resembles most, `[N]`."""
+        """The class with the highest score, `[N]`."""
         best = self._scores(X).argmax(1)
         return self.classes_[best]
 
 
 class BehaviourRegressor(RegressorMixin, QuantileEncoding):
-    """Answer rows of readings `[N, n]` with smooth values, by one hypervector of `dim` numbers.
+    """Predict continuous values for rows of readings `[N, n]` with one hypervector of `dim` numbers.
 
-    Readings are encoded as in `BehaviourClassifier`. Each output is an actuator with a random role, and the
-    value v is the hypervector v · role, so that values between those shown lie between their codes. The program
-    solves a ridge problem (`behaviours.learning.least_squares.solve`), and an output is the answer's product with its
-    role. Deviations from the mean of the training rows are learned, in units of their standard deviation.
+    Readings are encoded as in `BehaviourClassifier`. Each output is an actuator with a random role, and the value v is
+    the hypervector v · role, so that the codes of values interpolate linearly. The program is the solution of a ridge
+    regression (`behaviours.learning.least_squares.solve`), and an output is the inner product of the unbound result
+    with its role. Targets are standardised first.
 
-    `ridge` is the weight of the program's squared length, in units of one stored pair's; the other parameters as
-    there. A `fit` that fails leaves the estimator as it was.
+    `ridge` is the weight of the squared length of the program, in units of that of one stored pair; the other
+    parameters are those of `BehaviourClassifier`. If `fit` fails, the estimator is not changed.
 
-    Fitted: `program_` `[dim]`, `space_`, `mean_` and `scale_` `[m]`, `n_features_in_`.
+    Fitted attributes: `program_` `[dim]`, `space_`, `mean_` and `scale_` `[m]`, `n_features_in_`.
     """
 
     def __init__(
@@ -214,12 +211,11 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
     def fit(self, X: Any, y: Any) -> Self:  # noqa: N803
         """Train the program on rows `X` `[N, n]` and values `y` `[N]` or `[N, m]`.
 
-        Raises `ValueError` for infinite values, rows without any value, features whose range is no finite float, and
-        parameters that cannot work.
+        Raises `ValueError` for infinite values, rows of NaN only, features whose range is no finite float, and invalid
+        parameters.
         """
         with self._all_or_nothing():
             self._check_parameters()
-            ridge = self._positive("ridge")
             readings, y = self._checked(X, y, multi_output=True, y_numeric=True)
             values = np.asarray(y, dtype=np.float64)
             self._flat = values.ndim == 1
@@ -227,34 +223,27 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
             actuators = [Actuator(f"y{i}", -1, 1, levels=2) for i in range(targets.shape[1])]
             self.space_ = self._space(readings, actuators)
             progress = self._progress()
-            conditions = torch.cat(self._conditions(self.space_, readings, between(progress, 0, 0.5)))
-            self.program_ = self._solved(conditions, torch.from_numpy(targets), ridge)
+            conditions = torch.cat(self._conditions(self.space_, readings, subrange(progress, 0, 0.5)))
+            roles = self.space_.result_encoder.roles
+            self.program_ = solve(self.space_.vsa, conditions, roles, torch.from_numpy(targets), self.ridge)
             progress(1.0)
         return self
 
-    def _solved(
-        self, conditions: Shaped[Tensor, "N d"], targets: Float64[Tensor, "N m"], ridge: float
-    ) -> Shaped[Tensor, "d"]:
-        """The program of the ridge problem; raises `ValueError` where `ridge` leaves it without a solution."""
-        try:
-            program = solve(self.space_.vsa, conditions, self.space_.results.roles, targets, ridge)
-        except torch.linalg.LinAlgError as error:  # pyright: ignore[reportPrivateImportUsage]
-            raise ValueError(f"ridge={ridge} leaves the system of these rows singular; take a larger one") from error
-        if not program.isfinite().all():
-            raise ValueError(f"ridge={ridge} leaves no finite solution for these rows; take one nearer to 1")
-        return program
+    def _check_parameters(self) -> None:
+        super()._check_parameters()
+        check_ridge(self.ridge)
 
     def predict(self, X: Any) -> Float64[np.ndarray, "N ..."]:  # noqa: N803
-        """The values that the program answers, `[N]` or `[N, m]` as in `fit`."""
+        """The predicted values, `[N]` or `[N, m]` as in `fit`."""
         check_is_fitted(self)
         readings = self._checked(X, reset=False)
-        readout = self.space_.vsa.readout(self.program_.double(), self.space_.results.roles)
+        readout = self.space_.vsa.readout(self.program_.double(), self.space_.result_encoder.roles)
         scores = torch.cat([readout(block) for block in self._conditions(self.space_, readings)])
-        # A product with a role, not with a role of length 1.
-        answers = scores * readout.lengths
+        # Scores are divided by the lengths of the roles; the inner products are needed here.
+        products = scores * readout.lengths
         with np.errstate(over="ignore"):
-            values = answers.numpy() * self.scale_ + self.mean_
-        # Answers a little beyond the values shown may be beyond the largest float.
+            values = products.numpy() * self.scale_ + self.mean_
+        # Extrapolation from the largest floats may overflow.
         values = values.clip(-sys.float_info.max, sys.float_info.max)
         return values[:, 0] if self._flat else values
 
@@ -266,9 +255,9 @@ _SQUARABLE = 400
 def _standardised(
     values: Float64[np.ndarray, "N m"],
 ) -> tuple[Float64[np.ndarray, "N m"], Float64[np.ndarray, "m"], Float64[np.ndarray, "m"]]:
-    """Deviations from the mean in units of the standard deviation (1 where there is none), the mean, and the unit."""
+    """The standardised values, the mean, and the standard deviation (1 where it is 0)."""
     exponent = np.frexp(np.abs(values).max(0))[1]
-    # Powers of two, which change no digit, bring the others to about 1.
+    # Values outside that range are scaled to about 1 by powers of two, which are exact.
     exponent = np.where(np.abs(exponent) > _SQUARABLE, exponent, 0)
     moderate = np.ldexp(values, -exponent)
     mean, deviation = moderate.mean(0), moderate.std(0)

@@ -1,4 +1,4 @@
-"""A behaviour made ready to be asked at every control tick."""
+"""A read-only behaviour for control loops, with everything precomputed that does not depend on the readings."""
 
 import copy
 import math
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from behaviours.controller import Controller
-from behaviours.recall import Recall, recalled
+from behaviours.recall import Recall, answer_conditions
 from behaviours.space import Space
 from torchvsa import Readout
 from torchvsa._blocks import by_blocks
@@ -21,14 +21,14 @@ from torchvsa._rows import Row, noise, real, row_encoder
 
 
 class FrozenBehaviour(Controller):
-    """A behaviour that is only asked: what does not depend on the readings is computed once.
+    """A read-only copy of a behaviour: what does not depend on the readings is computed once.
 
-    Made by `Behaviour.freeze`; later changes of the behaviour and of its space do not reach it. It answers as its
-    behaviour does: integer programs with the same bits, float programs with the same commands (where no two results are
-    equally good within 1e-5) and with similarity, margin and familiarity that differ by less than 1e-5.
+    Made by `Behaviour.freeze`; later changes of the behaviour and of its space do not affect it. Integer programs give
+    the same bits as the behaviour. Float programs give the same commands (unless two results score within 1e-5), and
+    similarity, margin and familiarity that differ by less than 1e-5.
 
-    One row is answered by NumPy, in less than a tenth of the time, where architecture, encoder and protection have a
-    form for it (`torchvsa._rows`); any other batch as its behaviour would. It can be compiled too:
+    A single row is computed by NumPy, in less than a tenth of the time, if architecture, encoder and protection support
+    it (`torchvsa._rows`); other batches are computed as by the behaviour. It can be compiled too:
 
         tick = torch.compile(behaviour.freeze(), fullgraph=True)
         tick(torch.tensor([[0.3, 1.2, 0.5]], dtype=torch.float64)).commands
@@ -47,21 +47,21 @@ class FrozenBehaviour(Controller):
         self._tick = _Tick.of(self)
 
     def forward(self, readings: Any) -> Recall:
-        """See `Controller.forward`."""
-        return self._at_once(readings) or super().forward(readings)
+        """Commands `[B, m]` for readings `[B, n]`, see `Controller.forward`."""
+        return self._fast_answer(readings) or super().forward(readings)
 
     def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
-        """See `Controller.step`."""
-        recall = self._at_once(readings)
+        """The answer to the readings `[B, n]` of the next step, see `Controller.step`."""
+        recall = self._fast_answer(readings)
         return super().step(readings, state) if recall is None else (recall, state)
 
-    def _at_once(self, readings: Any) -> Recall | None:
-        """The answer to one row, where there is a short way to it and nothing is to be refused."""
+    def _fast_answer(self, readings: Any) -> Recall | None:
+        """The answer to a single valid row, or None where the fast path does not apply."""
         return None if self._tick is None or torch.compiler.is_compiling() else self._tick(readings)
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         return by_blocks(
-            lambda rows: recalled(self.readout, self.known, self.commands, self.space.encode(rows)),
+            lambda rows: answer_conditions(self.readout, self.known, self.commands, self.space.encode(rows)),
             cells,
             row_bytes=8 * self.space.vsa.dim,
         )
@@ -69,7 +69,7 @@ class FrozenBehaviour(Controller):
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "FrozenBehaviour":
         commands = self.commands
         super()._apply(fn, recurse)
-        # Commands stay in float64, and go with the program to another device.
+        # Commands stay float64, and follow the program to another device.
         self.commands = commands.to(self.readout.programs.device)
         self._tick = _Tick.of(self)
         return self
@@ -79,7 +79,7 @@ Noise = Callable[[NDArray[np.float64], NDArray[np.float64]], float]
 
 
 class _Tick:
-    """The steps from one row of readings to an answer, on NumPy's arrays."""
+    """Recall of a single row, in NumPy."""
 
     def __init__(self, frozen: FrozenBehaviour, encode: Row, noise: Noise) -> None:
         schema, readout = frozen.space.schema, frozen.readout
@@ -92,7 +92,7 @@ class _Tick:
         self.ends = self.low.tolist(), self.high.tolist()
         known, _ = in_units(frozen.known)
         rows = [real_parts(as_bipolar(rows)).to(torch.float64) for rows in (readout.folded, known[None])]
-        # Products of integers are exact in float64, whatever the order of their sums.
+        # Sums of integer products are exact in float64, in any order.
         self.table = torch.cat(rows).numpy()
         self.lengths = torch.where(readout.lengths == 0, 1.0, readout.lengths).numpy()
         self.known_length = float(norms(known))
@@ -100,7 +100,7 @@ class _Tick:
 
     @classmethod
     def of(cls, frozen: FrozenBehaviour) -> "_Tick | None":
-        """None where one of the parts has no form in NumPy."""
+        """The fast path, or None if one of the parts does not support it."""
         space, readout = frozen.space, frozen.readout
         encode = row_encoder(space.encoder, space.protect)
         all_real = all(sensor.kind == "real" for sensor in space.schema.sensors)
@@ -110,8 +110,8 @@ class _Tick:
 
     def __call__(self, readings: Any) -> Recall | None:
         row = _one_row(readings, len(self.low))
-        # A row without any reading, or with a wrong one, goes the long way.
-        if row is None or not self._sound(row.tolist()):
+        # A row with no reading, or with an invalid one, takes the general path.
+        if row is None or not self._valid(row.tolist()):
             return None
         condition = real(self.encode((row - self.low) / self.width))
         squares = condition * condition
@@ -123,22 +123,22 @@ class _Tick:
         scores[best] = -np.inf
         familiarity = products[-1] / (length * self.known_length or 1.0)
         margin = top - scores.max() if len(scores) > 1 else np.inf
-        sure = torch.from_numpy(np.array([[top / noise], [margin / noise], [familiarity]], dtype=np.float32))
-        return Recall(torch.from_numpy(self.commands[best : best + 1].copy()), *sure.unbind())
+        scalars = torch.from_numpy(np.array([[top / noise], [margin / noise], [familiarity]], dtype=np.float32))
+        return Recall(torch.from_numpy(self.commands[best : best + 1].copy()), *scalars.unbind())
 
-    def _sound(self, values: list[float]) -> bool:
-        """Whether all readings are in range or, some of them, NaN. (So few numbers take NumPy longer.)"""
-        seen = False
+    def _valid(self, values: list[float]) -> bool:
+        """Whether each reading is in range or NaN, and not all are NaN. (For so few numbers NumPy is slower.)"""
+        observed = False
         for value, low, high in zip(values, self.ends[0], self.ends[1], strict=True):
             if low <= value <= high:
-                seen = True
+                observed = True
             elif value == value:
                 return False
-        return seen
+        return observed
 
 
 def _one_row(readings: Any, sensors: int) -> NDArray[np.float64] | None:
-    """One row of numbers as float64 `[n]`; None for anything else."""
+    """A batch of one row as float64 `[n]`; None for anything else."""
     if isinstance(readings, Tensor):
         if readings.device.type != "cpu" or readings.requires_grad or readings.dtype not in _FLOATS:
             return None

@@ -1,4 +1,4 @@
-"""The clean-up memory of results, and the commands that each of them stands for."""
+"""The clean-up memory of results, and the commands that each result decodes to."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,10 +14,10 @@ from torchvsa import CleanUp, ShapeError
 
 
 class ResultMemory(nn.Module):
-    """The stored results as levels of the actuators, `levels` `[K, m]`, in order of first insertion.
+    """The stored results as levels of the actuators, `levels` `[K, m]`, in order of first appearance.
 
-    Derived from them: `items` `[K, d]`, their hypervectors, and `commands` `[K, m]`, what Algorithm 2 decodes
-    from each. The codes of the levels that appear, again in order, are the clean-up memory of each actuator.
+    Derived from them: `items` `[K, d]`, the hypervectors, and `commands` `[K, m]`, which Algorithm 2 decodes from the
+    items. The clean-up memory of an actuator holds the codes of its levels in `levels`, in order of first appearance.
     """
 
     levels: Tensor
@@ -27,7 +27,7 @@ class ResultMemory(nn.Module):
     def __init__(self, space: Space, levels: Int64[Tensor, "k m"]) -> None:
         super().__init__()
         check_levels(space.schema, levels)
-        # In a tuple: the behaviour owns the space, whose codebooks must not stand twice in its state.
+        # In a tuple, so that it is no submodule: the codebooks are in the state of the behaviour already.
         self._space = (space,)
         self.register_buffer("levels", levels)
         self.register_buffer("items", None, persistent=False)
@@ -43,19 +43,19 @@ class ResultMemory(nn.Module):
         self._derived_from = tuple(tensor.clone() for tensor in self._sources())
 
     def current_items(self) -> Shaped[Tensor, "k d"]:
-        """`items`; on a CPU, derived anew (and `commands` with them) if levels or codebooks were changed in place."""
+        """`items`; on a CPU, they and `commands` are derived again if levels or codebooks were changed in place."""
         if not torch.compiler.is_compiling() and self.levels.device.type == "cpu":
             sources = zip(self._derived_from, self._sources(), strict=True)
-            if not all(kept.dtype == now.dtype and torch.equal(kept, now) for kept, now in sources):
+            if not all(saved.dtype == current.dtype and torch.equal(saved, current) for saved, current in sources):
                 self.derive()
         return self.items
 
     def _sources(self) -> tuple[Tensor, ...]:
         (space,) = self._space
-        return self.levels, *space.results.state_dict().values()
+        return self.levels, *space.result_encoder.state_dict().values()
 
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "ResultMemory":
-        # Commands stay in float64, and go with the levels to another device.
+        # Commands stay float64, and follow the levels to another device.
         commands = self.commands
         super()._apply(fn, recurse)
         self.commands = commands.to(self.levels.device)
@@ -68,7 +68,7 @@ def _derive_again(module: nn.Module, _: Any) -> None:
 
 
 def check_levels(schema: Schema, levels: Int64[Tensor, "k m"]) -> None:
-    """Raise `ValueError` unless `levels` are distinct rows of levels of the actuators, at least one."""
+    """Raise `ValueError` unless `levels` is at least one row of valid levels, and all rows differ."""
     actuators = schema.actuators
     if levels.dim() != 2 or levels.shape[1] != len(actuators) or len(levels) == 0:
         raise ShapeError(
@@ -82,23 +82,23 @@ def check_levels(schema: Schema, levels: Int64[Tensor, "k m"]) -> None:
     if wrong.any():
         row, column = wrong.nonzero()[0].tolist()
         raise ValueError(
-            f"results holds level {levels[row, column]} in row {row} for actuator {actuators[column].name!r}, "
+            f"results has level {levels[row, column]} in row {row} for actuator {actuators[column].name!r}, "
             f"which has the levels 0 to {actuators[column].levels - 1}"
         )
     if len(distinct_rows(levels)[0]) < len(levels):
-        raise ValueError("results must differ from each other; two of the rows are the same")
+        raise ValueError("results must differ from each other; two rows are equal")
 
 
 def decode(space: Space, levels: Int64[Tensor, "k m"], items: Shaped[Tensor, "k d"]) -> Tensor:
     """The commands of each stored result (Algorithm 2, lines 4 to 8).
 
-    They depend on the winning result alone, so they are a table: for actuator i the result is unbound from
-    its role and compared with the values of that actuator that were stored.
+    They depend only on the recalled result, so that they are computed once: for actuator i, the result is unbound from
+    the role of i and compared with the stored codes of that actuator.
     """
     columns = []
     for actuator in range(levels.shape[1]):
         stored = in_order_of_appearance(levels[:, actuator])
-        values = CleanUp(space.results.value.encode(stored))
-        noisy = space.vsa.unbind(items, space.results.roles[actuator])
+        values = CleanUp(space.result_encoder.value.encode(stored))
+        noisy = space.vsa.unbind(items, space.result_encoder.roles[actuator])
         columns.append(stored[values(noisy).index])
     return space.schema.command_values(torch.stack(columns, -1))

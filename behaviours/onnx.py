@@ -1,6 +1,6 @@
-"""ONNX files of behaviours, for robots that run no Python: one call of onnxruntime answers with commands.
+"""Export behaviours to ONNX, for robots without Python.
 
-The only module of the behaviours that needs the packages of the extra `onnx`; nothing loads it by itself.
+This module needs the packages of the extra `onnx`, and is not imported by `behaviours`.
 """
 
 import json
@@ -23,20 +23,20 @@ OUTPUTS = ("commands", "similarity", "margin", "familiarity", "speaker")
 
 
 def to_onnx(behaviour: Behaviour | Policy, path: str | Path) -> Path:
-    """Write a behaviour, or a policy, to one ONNX file, whole or not at all.
+    """Write a behaviour or policy to one ONNX file, completely or not at all.
 
     | | name | type and shape |
     |---|---|---|
-    | input | `readings` | float64 `[batch, n]`; NaN is not observed, values out of range count as the nearest bound |
+    | input | `readings` | float64 `[batch, n]`; NaN means not observed; values out of range are clipped |
     | outputs | `commands` | float64 `[batch, m]`; NaN where no sensor was observed |
     | | `similarity`, `margin`, `familiarity` | float32 `[batch]`, see `Recall` |
     | | `speaker` | int64 `[batch]`, for a policy only |
 
-    The file holds codebooks, program and clean-up memory as they are now, and the names of sensors and actuators as
-    JSON in its metadata. Integer codes answer exactly what the module does. (`torch.onnx.export(behaviour, (readings,),
+    The file contains the current codebooks, program and clean-up memory, and in its metadata the names of sensors and
+    actuators as JSON. Integer codes give the same bits as the module. (`torch.onnx.export(behaviour, (readings,),
     dynamo=True, dynamic_shapes=({0: "batch"},))` writes the same graph.)
 
-    Raises `ImportError` without the packages, and `ValueError` for complex codes (FHRR), which ONNX does not know.
+    Raises `ImportError` without the packages, and `ValueError` for complex codes (FHRR), which ONNX lacks.
 
         >>> to_onnx(bank["seek_light"], "seek_light.onnx")                                  # doctest: +SKIP
         >>> session = onnxruntime.InferenceSession("seek_light.onnx")                       # doctest: +SKIP
@@ -45,17 +45,17 @@ def to_onnx(behaviour: Behaviour | Policy, path: str | Path) -> Path:
     space = behaviour.space
     if space.vsa.dtype.is_complex:
         raise ValueError(
-            f"ONNX knows no complex numbers, so that {space.vsa} cannot be written; use a real architecture"
+            f"ONNX has no complex numbers, so that {space.vsa} cannot be exported; use a real architecture"
         )
     answer = _Answer(behaviour)
     names = list(OUTPUTS if isinstance(behaviour, Policy) else OUTPUTS[:-1])
-    # Two rows: one alone would be taken for the size of every batch.
+    # Two rows: a batch size of 1 would be taken as constant.
     rows = torch.zeros(2, len(space.schema.sensors), dtype=torch.float64)
     try:
-        with _quiet(), _evaluating(answer):
-            # Exported by hand, since the converter would turn to a fixed size where the batch cannot stay open.
+        with _quiet(), _eval_mode(answer):
+            # Exported explicitly, since the converter would fall back to a fixed batch size without an error.
             graph = torch.export.export(answer, (rows,), dynamic_shapes=({0: torch.export.Dim("batch")},))
-            made = torch.onnx.export(
+            exported = torch.onnx.export(
                 graph,
                 dynamo=True,
                 input_names=["readings"],
@@ -67,15 +67,15 @@ def to_onnx(behaviour: Behaviour | Policy, path: str | Path) -> Path:
         if isinstance(missing, ModuleNotFoundError):
             raise ImportError(f"ONNX files need more packages: pip install 'torchvsa[onnx]' ({missing})") from error
         raise
-    assert made is not None
-    model = made.model_proto
+    assert exported is not None
+    model = exported.model_proto
     for key, parts in (("sensors", space.schema.sensors), ("actuators", space.schema.actuators)):
         model.metadata_props.add(key=key, value=json.dumps([part.name for part in parts]))
     return write_atomically(path, model.SerializeToString())
 
 
 class _Answer(nn.Module):
-    """A behaviour whose answer is a plain tuple."""
+    """A behaviour that returns a plain tuple."""
 
     def __init__(self, behaviour: Behaviour | Policy) -> None:
         super().__init__()
@@ -86,8 +86,8 @@ class _Answer(nn.Module):
 
 
 @contextmanager
-def _evaluating(module: nn.Module) -> Iterator[None]:
-    """Modes as the exporter wants them, and afterwards as they were; no behaviour depends on them."""
+def _eval_mode(module: nn.Module) -> Iterator[None]:
+    """Switch to evaluation mode, and restore the mode of each module on exit."""
     before = [(part, part.training) for part in module.modules()]
     module.eval()
     try:
@@ -99,7 +99,7 @@ def _evaluating(module: nn.Module) -> Iterator[None]:
 
 @contextmanager
 def _quiet() -> Iterator[None]:
-    """Without the exporter's remarks on its own parts."""
+    """Silence the log and the deprecation warnings of the exporter."""
     log = logging.getLogger("torch.onnx")
     level = log.level
     log.setLevel(logging.ERROR)

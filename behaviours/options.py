@@ -1,28 +1,33 @@
-"""Options as plain numbers, refused when they are given if they cannot work."""
+"""Check options when they are given, and convert them to plain Python numbers."""
 
 import math
-from numbers import Integral, Real
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
+from torchvsa._checks import whole_number
 
-def whole(name: str, value: Any, least: int, most: float = math.inf) -> int:
-    """A whole number as a plain int; NumPy's integers are accepted.
 
-    Raises `ValueError`, naming the option and what is allowed, for a number out of range and for any other type, bools
-    and floats included.
+def as_int(name: str, value: Any, least: int, most: float = math.inf) -> int:
+    """`value` as an int from `least` to `most`, both included; NumPy integers are accepted.
+
+    Raises `ValueError`, naming the option and what is allowed, for a number out of range and for any other type,
+    including bools and floats.
     """
-    if isinstance(value, bool) or not isinstance(value, Integral) or not least <= int(value) <= most:
-        raise ValueError(f"{name} is a whole number {_range(least, most)}; got {value!r}")
-    return int(value)
+    limits = f"of at least {least}" if most == math.inf else f"from {least} to {most}"
+    message = f"{name} is a whole number {limits}"
+    plain = whole_number(value, message)
+    if not least <= plain <= most:
+        raise ValueError(f"{message}; got {value!r}")
+    return plain
 
 
-def number(name: str, value: Any, least: float = -math.inf, *, above: bool = False, below: float = math.inf) -> float:
-    """A finite number from `least` on (with `above`, above it) and less than `below`, as a plain float.
+def as_float(name: str, value: Any, least: float = -math.inf, *, above: bool = False, below: float = math.inf) -> float:
+    """`value` as a finite float of at least `least` (with `above`, above it) and below `below`.
 
-    NumPy's numbers are accepted. Raises `ValueError`, naming the option and what is allowed, for NaN, infinity, a
-    number out of range, and any other type, bools and strings included.
+    NumPy numbers are accepted. Raises `ValueError`, naming the option and what is allowed, for NaN, infinity, a number
+    out of range and any other type, including bools and strings.
     """
     if isinstance(value, Real) and not isinstance(value, bool):
         try:
@@ -36,18 +41,14 @@ def number(name: str, value: Any, least: float = -math.inf, *, above: bool = Fal
     raise ValueError(f"{name} is a finite number{limits}; got {value!r}")
 
 
-def flag(name: str, value: Any) -> bool:
-    """True or False as a plain bool; NumPy's are accepted. Raises `ValueError` for anything else."""
+def as_bool(name: str, value: Any) -> bool:
+    """`value` as a bool; NumPy bools are accepted. Raises `ValueError` for anything else."""
     if not isinstance(value, bool | np.bool_):
         raise ValueError(f"{name} is True or False; got {value!r}")
     return bool(value)
 
 
-def store(options: object, **checked: Any) -> None:
-    """Set fields of a frozen dataclass, in its `__post_init__`, to the values that were checked."""
-    for name, value in checked.items():
+def set_fields(options: object, **values: Any) -> None:
+    """Set fields of a frozen dataclass in its `__post_init__`."""
+    for name, value in values.items():
         object.__setattr__(options, name, value)
-
-
-def _range(least: int, most: float) -> str:
-    return f"from {least} on" if most == math.inf else f"from {least} to {most}"

@@ -1,24 +1,23 @@
-"""A sensor and an actuator: a name, what it reads or is told, and a unit."""
+"""Sensors and actuators: names, ranges and units."""
 
 import math
-import operator
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any, Literal
 
-import numpy as np
+from behaviours.options import as_int
 
 _MOST_LEVELS = 2**31
-_SHOWN = 10
-"""So many values are listed in an error."""
+_MAX_LISTED = 10
+"""The most values that an error lists."""
 _ULPS = 4
-"""Neighbouring bins and levels are at least so many floats apart: rounding moves a value by at most 2 of them."""
+"""The least distance of neighbouring bins and levels, in units in the last place: rounding moves a value by up to 2."""
 
 
 def _bound(part: "Sensor | Actuator", kind: str, which: str) -> int | float:
-    """The bound `low` or `high` as a plain number."""
+    """The bound `low` or `high` as a Python number."""
     given = getattr(part, which)
     value = _plain(given)
     if value is None:
@@ -27,7 +26,7 @@ def _bound(part: "Sensor | Actuator", kind: str, which: str) -> int | float:
 
 
 def _plain(given: Any) -> int | float | None:
-    """A real number as a plain one; None for anything else, truth values included."""
+    """A real number as a Python number; None for anything else, including bools."""
     value = given.item() if getattr(given, "ndim", None) == 0 else given
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
@@ -35,7 +34,7 @@ def _plain(given: Any) -> int | float | None:
 
 
 def _check_part(part: "Sensor | Actuator", kind: str) -> None:
-    """Raise unless a sensor or actuator has a name and a unit."""
+    """Raise `ValueError` unless a sensor or actuator has a name and a unit."""
     if not isinstance(part.name, str) or not part.name:
         raise ValueError(f"every {kind} needs a name, a string; got {part.name!r}")
     if not isinstance(part.unit, str):
@@ -43,7 +42,7 @@ def _check_part(part: "Sensor | Actuator", kind: str) -> None:
 
 
 def _check_range(part: "Sensor | Actuator", kind: str) -> None:
-    """Raise unless a sensor or actuator has a range; keep its bounds as plain numbers."""
+    """Raise `ValueError` unless a sensor or actuator has a range; store its bounds as Python numbers."""
     low, high = (_bound(part, kind, which) for which in ("low", "high"))
     try:
         width = float(high) - float(low)
@@ -51,7 +50,7 @@ def _check_range(part: "Sensor | Actuator", kind: str) -> None:
         width = math.nan
     if not (math.isfinite(width) and width > 0):
         raise ValueError(
-            f"{kind} {part.name!r} needs a finite range with low < high, whose width high - low is finite as well; "
+            f"{kind} {part.name!r} needs a finite range with low < high, whose width high - low is finite too; "
             f"got [{part.low}, {part.high}]"
         )
     object.__setattr__(part, "low", low)
@@ -59,41 +58,41 @@ def _check_range(part: "Sensor | Actuator", kind: str) -> None:
 
 
 def most_parts(low: float, high: float) -> float:
-    """The most parts of equal width in which float64 can tell the values of a range apart."""
+    """The largest number of equal parts of a range whose values differ in float64."""
     width = high - low
-    # Positions are computed as (value - low) * parts, which has to be finite too.
+    # Positions are computed as (value - low) * parts, which must be finite too.
     return min(width / (_ULPS * math.ulp(max(abs(low), abs(high)))), sys.float_info.max / width)
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """A sensor by its name and what it reads; NaN means that it was not observed.
+    """A sensor: its name, the values that it reads, and their unit. A reading of NaN was not observed.
 
-    | kind | what it reads | what to give |
+    | kind | readings | arguments |
     |---|---|---|
     | `"real"` | numbers in `[low, high]` | `low` and `high` |
-    | `"angle"` | any finite number: `low` and `high` are the same direction, and it wraps around | `low` and `high` |
-    | `"binary"` | 0 and 1, or False and True | nothing |
-    | `"categorical"` | one of `values`, in no order | `values` |
+    | `"angle"` | any finite number, modulo the range: `low` and `high` are the same direction | `low` and `high` |
+    | `"binary"` | 0 and 1, or False and True | none |
+    | `"categorical"` | one of `values`, unordered | `values` |
 
         Sensor("distance", 0, 4, unit="m")
         Sensor("heading", -180, 180, unit="deg", kind="angle")
         Sensor("bumper", kind="binary")
         Sensor("gear", kind="categorical", values=("low", "high", "reverse"))
 
-    `values` are all text, or all numbers. Numbers are read as they are. Text is read as text, or as its index in
-    `values` (0 for the first one): tensors hold numbers only. `beyond` says what becomes of a real reading outside the
-    range: an error, or the nearest bound. Of binary and categorical sensors `low` and `high` are the least and the
-    greatest number that they read.
+    `values` are all strings or all numbers. A reading of a sensor with string values is the string, or its index in
+    `values` (0 for the first one), since tensors hold only numbers. A real reading outside the range is an error
+    (`out_of_range="error"`) or becomes the nearest bound (`"clip"`). For binary and categorical sensors `low` and
+    `high` are set to the smallest and the largest reading.
 
-    Raises `ValueError`, naming the sensor, for what makes no sense.
+    Raises `ValueError`, naming the sensor, for arguments that do not fit its kind.
     """
 
     name: str
     low: float = math.nan
     high: float = math.nan
     unit: str = ""
-    beyond: Literal["error", "clip"] = "error"
+    out_of_range: Literal["error", "clip"] = "error"
     kind: Literal["real", "angle", "binary", "categorical"] = "real"
     values: Sequence[str] | Sequence[float] = ()
 
@@ -103,10 +102,12 @@ class Sensor:
             raise ValueError(
                 f"sensor {self.name!r}: kind is 'real', 'angle', 'binary' or 'categorical'; got {self.kind!r}"
             )
-        if self.beyond not in ("error", "clip"):
-            raise ValueError(f"sensor {self.name!r}: beyond is 'error' or 'clip'; got {self.beyond!r}")
-        if self.kind != "real" and self.beyond != "error":
-            raise ValueError(f"sensor {self.name!r}: only real sensors have a nearest bound, beyond={self.beyond!r}")
+        if self.out_of_range not in ("error", "clip"):
+            raise ValueError(f"sensor {self.name!r}: out_of_range is 'error' or 'clip'; got {self.out_of_range!r}")
+        if self.kind != "real" and self.out_of_range != "error":
+            raise ValueError(
+                f"sensor {self.name!r}: only real sensors have a nearest bound, out_of_range={self.out_of_range!r}"
+            )
         object.__setattr__(self, "values", self._checked_values())
         if self.choices:
             self._take_range(min(self.choices), max(self.choices))
@@ -115,18 +116,18 @@ class Sensor:
 
     @property
     def choices(self) -> tuple[float, ...]:
-        """The numbers that a binary or categorical sensor reads, indices for text; none for the other kinds."""
+        """The readings of a binary or categorical sensor as numbers, indices for strings; empty for other kinds."""
         if self.kind == "binary":
             return 0, 1
-        return tuple(place if isinstance(value, str) else value for place, value in enumerate(self.values))
+        return tuple(index if isinstance(value, str) else value for index, value in enumerate(self.values))
 
     @property
     def labels(self) -> dict[str, int]:
-        """The index of each value that is text."""
-        return {value: place for place, value in enumerate(self.values) if isinstance(value, str)}
+        """The index of each string in `values`."""
+        return {value: index for index, value in enumerate(self.values) if isinstance(value, str)}
 
-    def described(self) -> str:
-        """What the sensor reads, in words for errors."""
+    def describe(self) -> str:
+        """The valid readings in words, for error messages."""
         unit = f" {self.unit}" if self.unit else ""
         if self.kind == "binary":
             return "it is binary: 0 or 1, False or True"
@@ -134,8 +135,8 @@ class Sensor:
             return f"it is an angle: any finite number, of which {self.low:g} and {self.high:g}{unit} are the same"
         if not self.values:
             return f"its range is [{self.low:g}, {self.high:g}]{unit}"
-        shown = ", ".join(map(repr, self.values[:_SHOWN]))
-        shown += f", ... ({len(self.values)} in all)" if len(self.values) > _SHOWN else ""
+        shown = ", ".join(map(repr, self.values[:_MAX_LISTED]))
+        shown += f", ... ({len(self.values)} in all)" if len(self.values) > _MAX_LISTED else ""
         return f"its values are {shown}{unit}" + (f", or their indices 0 to {self.high}" if self.labels else "")
 
     def _checked_values(self) -> tuple[str, ...] | tuple[float, ...]:
@@ -152,27 +153,27 @@ class Sensor:
         texts = tuple(str(value) for value in values if isinstance(value, str))
         numbers = tuple(number for value in values if (number := _plain(value)) is not None)
         if len(values) not in (len(texts), len(numbers)):
-            raise ValueError(f"{who}: values are all text, or all real numbers; got {list(values)!r:.200}")
+            raise ValueError(f"{who}: values are all strings, or all real numbers; got {list(values)!r:.200}")
         # As float64, the type of all readings.
-        different = len(set(texts) or {_finite(number) for number in numbers})
-        if different < len(values) or not all(math.isfinite(_finite(number)) for number in numbers):
+        distinct = len(set(texts) or {_finite(number) for number in numbers})
+        if distinct < len(values) or not all(math.isfinite(_finite(number)) for number in numbers):
             raise ValueError(f"{who}: values must be finite and differ from each other; got {list(values)!r:.200}")
         return texts or numbers
 
     def _take_range(self, low: float, high: float) -> None:
-        """Set the range that follows from what is read. Raises `ValueError` if another one was given."""
+        """Set the range of the choices. Raises `ValueError` if another range was given."""
         for which, value in (("low", low), ("high", high)):
             given = getattr(self, which)
             left_out = isinstance(given, float) and math.isnan(given)
             if not left_out and _plain(given) != value:
                 raise ValueError(
-                    f"sensor {self.name!r} is {self.kind}, and has no range of its own; leave out {which}={given!r}"
+                    f"sensor {self.name!r} is {self.kind}, and its values define its range; leave out {which}={given!r}"
                 )
             object.__setattr__(self, which, value)
 
 
 def _finite(number: float) -> float:
-    """A number in float64; infinity where it is too large for it."""
+    """A number as a float; infinity if it is too large."""
     try:
         return float(number)
     except OverflowError:
@@ -181,7 +182,7 @@ def _finite(number: float) -> float:
 
 @dataclass(frozen=True)
 class Actuator:
-    """A motor with commands in `[low, high]`, told apart at `levels` evenly spaced values, both ends among them."""
+    """A motor with commands in `[low, high]`, quantised to `levels` evenly spaced values including both ends."""
 
     name: str
     low: float
@@ -192,18 +193,10 @@ class Actuator:
     def __post_init__(self) -> None:
         _check_part(self, "actuator")
         _check_range(self, "actuator")
-        try:
-            levels = -1 if isinstance(self.levels, bool | np.bool_) else operator.index(self.levels)
-        except TypeError:
-            levels = -1
-        if not 2 <= levels <= _MOST_LEVELS:
-            raise ValueError(
-                f"actuator {self.name!r} needs at least 2 levels; got {self.levels!r}, expected a whole number from 2 "
-                "to 2^31"
-            )
+        levels = as_int(f"actuator {self.name!r}: levels", self.levels, 2, _MOST_LEVELS)
         object.__setattr__(self, "levels", levels)
         if levels - 1 > most_parts(self.low, self.high):
             raise ValueError(
                 f"actuator {self.name!r}: {levels} levels of the range [{self.low}, {self.high}] cannot be told apart "
-                "in float64; take fewer, or a range of another width or nearer to 0"
+                "in float64; take fewer levels, or a wider range, or one nearer to 0"
             )

@@ -1,15 +1,15 @@
-"""How long work tells how far it is."""
+"""Progress callbacks."""
 
 from collections.abc import Callable
 
 Progress = Callable[[float], object]
-"""Called with the share of the work that is done, from 0 to 1, now and then and at its end."""
+"""Called with the completed fraction of the work, from 0 to 1, at intervals and at the end."""
 
 
-def silent(share: float) -> None:
-    """Tell nobody."""
+def no_progress(fraction: float) -> None:
+    """Ignore progress."""
 
 
-def between(progress: Progress, low: float, high: float) -> Progress:
-    """The progress of a part of the work, which takes it from `low` to `high`."""
-    return lambda share: progress(low + (high - low) * share)
+def subrange(progress: Progress, low: float, high: float) -> Progress:
+    """A callback for a part of the work: maps its fractions to the range from `low` to `high` of `progress`."""
+    return lambda fraction: progress(low + (high - low) * fraction)

@@ -1,11 +1,9 @@
-"""What the estimators for scikit-learn share: parameters, and sensors that are binned at quantiles."""
+"""The base of the scikit-learn estimators: parameters, and sensors that are binned at quantiles."""
 
 import math
-import operator
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -17,7 +15,8 @@ from sklearn.utils.validation import validate_data
 from torch import Tensor
 
 from behaviours.edges import quantile_edges
-from behaviours.progress import Progress, silent
+from behaviours.options import as_int
+from behaviours.progress import Progress, no_progress
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Space
 from torchvsa import MAP
@@ -25,9 +24,9 @@ from torchvsa._memory_limit import require_memory
 from torchvsa.encoders import Balanced, ThresholdFeatures
 
 _ROWS = 1024
-"""Rows encoded at once."""
+"""Rows encoded in one call; bounds the memory."""
 _EDGE_BYTES = 24
-"""A bin's edge is kept as a float64, twice while all of them are put together and once more while one is found."""
+"""The memory per edge: a float64, a copy while edges are joined, and one more while they are computed."""
 
 
 class QuantileEncoding(BaseEstimator):
@@ -45,42 +44,25 @@ class QuantileEncoding(BaseEstimator):
         return tags
 
     def _check_parameters(self) -> None:
-        """Raise `ValueError`, naming the parameter, unless fitting can work with these."""
+        """Raise `ValueError`, naming the parameter, for invalid parameters."""
         for name in ("dim", "bins", "subset"):
             self._whole(name)
         self._whole("verbose", 0)
         try:
             check_random_state(self.random_state)
         except ValueError as error:
-            raise ValueError(f"random_state={self.random_state!r} is no seed: {error}") from error
+            raise ValueError(f"random_state={self.random_state!r} is not a seed: {error}") from error
 
     def _whole(self, name: str, at_least: int = 1) -> int:
-        """The parameter `name` as a plain integer."""
+        """The parameter `name` as an int."""
         given = getattr(self, name)
-        try:
-            value = operator.index(given)
-        except TypeError:
-            value = at_least - 1
-        # `verbose=True` is common usage; no other count is a boolean.
-        if value < at_least or (isinstance(given, bool | np.bool_) and name != "verbose"):
-            raise ValueError(f"{name} must be a whole number, at least {at_least}; got {given!r}")
-        return value
-
-    def _positive(self, name: str) -> float:
-        """The parameter `name` as a float above 0."""
-        given = getattr(self, name)
-        try:
-            number = isinstance(given, Real) and not isinstance(given, bool | np.bool_)
-            value = float(given) if number else math.nan
-        except OverflowError:
-            value = math.inf
-        if not 0 < value < math.inf:
-            raise ValueError(f"{name} must be a finite number above 0; got {given!r}")
-        return value
+        if name == "verbose" and isinstance(given, bool | np.bool_):
+            return int(given)  # `verbose=True` is common usage
+        return as_int(name, given, at_least)
 
     @contextmanager
     def _all_or_nothing(self) -> Iterator[None]:
-        """Leave the estimator exactly as it was if what is done within fails."""
+        """Restore the attributes of the estimator if the body raises."""
         before = dict(self.__dict__)
         try:
             yield
@@ -90,9 +72,9 @@ class QuantileEncoding(BaseEstimator):
             raise
 
     def _progress(self) -> Progress:
-        """Prints the share of the work that is done, at each further tenth, if `verbose` asks for it."""
+        """A callback that prints each completed tenth of the work if `verbose` is set."""
         if not self._whole("verbose", 0):
-            return silent
+            return no_progress
         printed = -1
 
         def show(share: float) -> None:
@@ -105,7 +87,7 @@ class QuantileEncoding(BaseEstimator):
         return show
 
     def _space(self, readings: Float64[np.ndarray, "N n"], actuators: list[Actuator]) -> Space:
-        """Codebooks for these readings; the edges of the bins see nothing but the readings."""
+        """A space for these readings; the bin edges depend on the readings alone."""
         bins, features = self._whole("bins"), readings.shape[1]
         require_memory(
             _EDGE_BYTES * bins * features,
@@ -116,40 +98,40 @@ class QuantileEncoding(BaseEstimator):
         names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(features)])
         sensors, edges = [], []
         for name, column in zip(names, torch.tensor(readings).T, strict=True):
-            seen = column[~column.isnan()]
-            low, high = (seen.min().item(), seen.max().item()) if len(seen) else (0.0, 0.0)
+            observed = column[~column.isnan()]
+            low, high = (observed.min().item(), observed.max().item()) if len(observed) else (0.0, 0.0)
             low, high = (low, high) if low < high else _around(low)
-            sensors.append(Sensor(str(name), low, high, beyond="clip"))
-            edges.append((quantile_edges(seen, bins) - low) / (high - low))
+            sensors.append(Sensor(str(name), low, high, out_of_range="clip"))
+            edges.append((quantile_edges(observed, bins) - low) / (high - low))
         vsa = MAP(self._whole("dim"), dtype=torch.int8)
         encoder = ThresholdFeatures(vsa, features, bins, self._whole("subset"), edges)
         codes = Balanced(vsa, max(actuator.levels for actuator in actuators))
         return Space(Schema(sensors, actuators), encoder, seed=seed, command_codes=codes)
 
     def _conditions(
-        self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = silent
+        self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = no_progress
     ) -> list[Shaped[Tensor, "batch d"]]:
-        """The encoded rows, some at a time; raises for rows in which nothing was observed."""
-        blind = np.isnan(readings).all(1)
-        if blind.any():
-            raise ValueError(f"row {int(blind.argmax())} has no observed feature: all of its values are NaN")
+        """The encoded rows in blocks. Raises `ValueError` for a row in which nothing was observed."""
+        unobserved = np.isnan(readings).all(1)
+        if unobserved.any():
+            raise ValueError(f"row {int(unobserved.argmax())} has no observed feature: all of its values are NaN")
         blocks = torch.tensor(readings).split(_ROWS)
         conditions = []
-        for done, block in enumerate(blocks, 1):
+        for number, block in enumerate(blocks, 1):
             conditions.append(space.encode(space.cells(block)))
-            progress(done / len(blocks))
+            progress(number / len(blocks))
         return conditions
 
     def _checked(self, *data: Any, **options: Any) -> Any:
-        """Readings `[N, n]` as float64, and targets where they are given, as scikit-learn checks them."""
-        # scikit-learn sums the readings first, which overflows for the largest floats.
+        """Readings `[N, n]` as float64, and targets if they are given, validated by scikit-learn."""
+        # Its validation sums the readings, which overflows for the largest floats.
         with np.errstate(over="ignore", invalid="ignore"):
             return validate_data(self, *data, dtype=np.float64, order="C", ensure_all_finite="allow-nan", **options)
 
 
 def _around(value: float) -> tuple[float, float]:
-    """A range around a constant reading, which has none, though a sensor needs one."""
-    # Beyond 2^53 a float less 1 is the same float.
+    """A range around a constant reading, since the range of a sensor must not be empty."""
+    # Above 2^53, subtracting 1 does not change a float.
     margin = max(1.0, 4 * math.ulp(value))
     most = sys.float_info.max
     return max(value - margin, -most), min(value + margin, most)

@@ -1,4 +1,4 @@
-"""What a behaviour answers."""
+"""The answer of a behaviour or policy."""
 
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -13,26 +13,28 @@ from torchvsa._numerics import in_units, inner_products, norms, over_lengths
 
 
 class Recall(NamedTuple):
-    """The answer to a batch of readings. Never a silent guess: it says how sure it is."""
+    """The answer to a batch of readings, with measures of its certainty."""
 
     commands: Float64[Tensor, "batch m"]
     """One command per actuator; NaN where no sensor was observed."""
     similarity: Float[Tensor, "batch"]
-    """Cosine of the noisy result with the stored result that won."""
+    """Cosine of the unbound, noisy result with the most similar stored result."""
     margin: Float[Tensor, "batch"]
-    """How far the runner-up lies below; inf if only one result is known."""
+    """Lead of `similarity` over that of the second most similar result; inf if there is only one."""
     familiarity: Float[Tensor, "batch"]
     """Cosine of the condition with the sum of the known conditions."""
     speaker: Int64[Tensor, "batch"] | None = None
-    """Which behaviour answered: its position in the policy's list of names (policies only)."""
+    """Index of the behaviour that answered, in `Policy.names` (policies only)."""
 
-    def rows(self, which: Int64[Tensor, "some"]) -> "Recall":
+    def rows(self, index: Int64[Tensor, "rows"]) -> "Recall":
         """The answers of these rows, in this order."""
-        spoken = None if self.speaker is None else self.speaker[which]
-        return Recall(self.commands[which], self.similarity[which], self.margin[which], self.familiarity[which], spoken)
+        speaker = None if self.speaker is None else self.speaker[index]
+        return Recall(
+            self.commands[index], self.similarity[index], self.margin[index], self.familiarity[index], speaker
+        )
 
-    def blank(self, rows: Any) -> "Recall":
-        """Answer nothing in the given rows: NaN commands; similarity, margin and familiarity 0; speaker -1."""
+    def mask_unobserved(self, rows: Any) -> "Recall":
+        """Replace these rows: commands by NaN; similarity, margin and familiarity by 0; speaker by -1."""
         return Recall(
             self.commands.masked_fill(rows[:, None], torch.nan),
             self.similarity.masked_fill(rows, 0.0),
@@ -42,34 +44,42 @@ class Recall(NamedTuple):
         )
 
 
-_MANY = 128
-"""Rows from which on it pays to find equal ones."""
+_MIN_ROWS = 128
+"""The number of rows from which finding equal ones saves time."""
 
 
-def asked_once(answer: Callable[[Shaped[Tensor, "some w"]], Recall], cells: Shaped[Tensor, "batch w"]) -> Recall:
-    """`answer(cells)`, asking once about rows that are equal: what a robot reads in a while falls into few cells.
+def over_unique_rows(answer: Callable[[Shaped[Tensor, "rows w"]], Recall], cells: Shaped[Tensor, "batch w"]) -> Recall:
+    """Evaluate `answer` on the unique rows of `cells`, and gather the results for all rows.
 
-    A graph and a GPU ask about every row, since how many differ is known only from the values.
+    A robot reads few distinct cells. Graphs and GPUs evaluate every row, since the number of unique rows depends on the
+    values.
     """
-    if torch.compiler.is_compiling() or cells.device.type != "cpu" or len(cells) < _MANY:
+    if torch.compiler.is_compiling() or cells.device.type != "cpu" or len(cells) < _MIN_ROWS:
         return answer(cells)
-    distinct, which = distinct_rows(cells)
-    return answer(distinct).rows(which)
+    unique, index = distinct_rows(cells)
+    return answer(unique).rows(index)
 
 
-def recalled(
+def answer_conditions(
     readout: Readout,
     known: Shaped[Tensor, "d"],
     commands: Float64[Tensor, "k m"],
     conditions: Shaped[Tensor, "batch d"],
 ) -> Recall:
-    """Answer encoded and protected conditions with the best item's row of `commands` (Algorithm 2, lines 2 to 8)."""
+    """The answer to encoded and protected conditions (Algorithm 2, lines 2 to 8).
+
+    Args:
+        readout: The program and the items of the clean-up memory.
+        known: The sum of the known conditions.
+        commands: The commands of each item.
+        conditions: Encoded and protected conditions.
+    """
     match = readout.match(conditions)
     return Recall(commands[match.index], match.similarity, match.margin, familiarity(conditions, known))
 
 
 def familiarity(conditions: Shaped[Tensor, "batch d"], known: Shaped[Tensor, "d"]) -> Float[Tensor, "batch"]:
-    """The cosine of each condition with the sum of the known ones; 0 where one of them is a zero vector."""
+    """The cosine of each condition with the sum of the known conditions; 0 for zero vectors."""
     known, _ = in_units(known)
     products = inner_products(conditions, known[None])[:, 0]
     return over_lengths(products.to(torch.float64), norms(conditions) * norms(known)).to(torch.float32)

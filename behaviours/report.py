@@ -3,14 +3,14 @@
 from dataclasses import dataclass
 from typing import Any
 
-from behaviours.options import store, whole
+from behaviours.options import as_int, set_fields
 
 
 @dataclass(frozen=True)
 class LearningReport:
-    """Counts of the samples of one demonstration, by what the rule decided about them.
+    """Counts of samples by what the rule did with them.
 
-    Raises `ValueError` unless `rule` is a string and every count a whole number from 0 on.
+    Raises `ValueError` unless `rule` is a string and every count a whole number of at least 0.
     """
 
     rule: str
@@ -18,46 +18,46 @@ class LearningReport:
     new: int
     """Samples whose condition was stored for the first time."""
     truly_known: int = 0
-    """Samples taken as known whose condition was stored before."""
+    """Samples skipped because their condition was stored before."""
     falsely_known: int = 0
-    """Samples taken as known although their condition was never stored: lost to the program."""
+    """Samples skipped although their condition was never stored."""
     re_added: int = 0
-    """Samples stored once more, since the memory had forgotten their condition."""
+    """Samples stored again, because `known` no longer resembled their condition."""
     contradicting: int = 0
     """Samples whose condition was stored before with another result."""
-    passes: int = 1
-    """How often the rule went through the pairs."""
+    epochs: int = 1
+    """Passes over the pairs."""
     updates: int = 0
-    """How often a trained program was corrected."""
+    """Corrections of a trained program, or steps of the optimiser."""
     wrong: int = 0
-    """Pairs that a trained program still recalls wrongly, or below the margin asked for."""
+    """Pairs that a trained program recalls wrongly, or below the margin of the rule."""
     presumed_known: int = 0
-    """Samples taken as known for their likeness to earlier pieces: truly or falsely, nobody remembers."""
+    """Samples skipped because they resembled earlier demonstrations; whether correctly is unknown."""
     terms: tuple[str, ...] = ()
-    """Of a sum of behaviours, what it is made of: `("seek", "2 * avoid")`."""
+    """The terms of a sum of behaviours, such as `("seek", "2 * avoid")`."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.rule, str):
-            raise ValueError(f"the rule of a report is the name of one; got {self.rule!r}")
+            raise ValueError(f"the rule of a report is a string; got {self.rule!r}")
         if isinstance(self.terms, str) or not all(isinstance(term, str) for term in self.terms):
-            raise ValueError(f"the terms of a report are a tuple of texts; got {self.terms!r}")
-        counts = {name: whole(name, value, 0) for name, value in self._counts().items()}
-        store(self, **counts, terms=tuple(self.terms))
+            raise ValueError(f"the terms of a report are strings; got {self.terms!r}")
+        counts = {name: as_int(name, value, 0) for name, value in self._counts().items()}
+        set_fields(self, **counts, terms=tuple(self.terms))
 
     def _counts(self) -> dict[str, int]:
         return {name: value for name, value in vars(self).items() if name not in ("rule", "terms")}
 
     @property
     def pairs(self) -> int:
-        """Pairs of condition and result added to the program, repetitions included."""
+        """The number of (condition, result) pairs added to the program, including repetitions."""
         return self.new + self.re_added
 
-    def then(self, later: "LearningReport") -> "LearningReport":
-        """The report of two pieces of demonstration: counts add up; `wrong` is known of the later one only."""
+    def merged(self, later: "LearningReport") -> "LearningReport":
+        """The report of this and later demonstrations: counts are added, but `wrong` is that of `later` alone."""
         counts: dict[str, Any] = {key: value + getattr(later, key) for key, value in self._counts().items()}
         counts["wrong"] = later.wrong
         return LearningReport(later.rule, **counts)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, for a file; `terms` only where there are some."""
+        """The report as plain values, for a file; without `terms` if there are none."""
         return {"rule": self.rule, **self._counts()} | ({"terms": list(self.terms)} if self.terms else {})

@@ -1,4 +1,4 @@
-"""What a robot senses and does: names, ranges, kinds and units."""
+"""The sensors and actuators of a robot, and the validation of its data."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -9,9 +9,9 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
-from behaviours.kinds import allowed, placed, settled
+from behaviours.kinds import canonical, to_unit_interval, valid_readings
 from behaviours.parts import Actuator, Sensor, most_parts
-from behaviours.tables import ReadText, column_names, compare_names, numbers
+from behaviours.tables import ReadText, column_names, compare_names, to_float64
 from torchvsa import ShapeError
 
 
@@ -19,8 +19,8 @@ from torchvsa import ShapeError
 class Schema:
     """The sensors and actuators of a robot, in the order of the columns of its data.
 
-    Readings and commands are rows of numbers: tensors, arrays, lists, or a DataFrame, whose names of columns must be
-    those of the schema in the same order. Readings of categorical sensors may be text, see `Sensor`.
+    Readings and commands are rows of numbers: tensors, arrays, lists, or a DataFrame whose column names are those of
+    the schema, in the same order. Readings of categorical sensors may be text, see `Sensor`.
     """
 
     sensors: Sequence[Sensor]
@@ -41,7 +41,7 @@ class Schema:
     def check_names(self, sensors: Sequence[str] | None = None, actuators: Sequence[str] | None = None) -> None:
         """Raise `ValueError`, naming the columns, unless these are the schema's names in the same order.
 
-        None stands for columns without names, which are not compared.
+        Columns without names (None) are not compared.
         """
         if sensors is not None:
             compare_names(sensors, [sensor.name for sensor in self.sensors], "sensor readings")
@@ -49,7 +49,7 @@ class Schema:
             compare_names(actuators, [actuator.name for actuator in self.actuators], "commands")
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, for a file; the kinds and values of sensors only where they differ from the default."""
+        """The schema as plain values, for a file; `kind` and `values` only if they differ from the default."""
         data = asdict(self)
         for sensor in data["sensors"]:
             if sensor["kind"] == "real":
@@ -64,62 +64,62 @@ class Schema:
         return cls([Sensor(**s) for s in data["sensors"]], [Actuator(**a) for a in data["actuators"]])
 
     def normalise(self, readings: Any) -> Float64[Tensor, "batch n"]:
-        """Readings as numbers in [0, 1], which encoders take; NaN (not observed) stays NaN.
+        """Map readings to [0, 1], for encoders; NaN (not observed) stays NaN.
 
-        A real reading is in units of its range, an angle a share of a full turn in [0, 1), a binary reading 0 or 1. The
-        i-th of c categories is (i + 0.5) / c, the middle of the i-th of c bins, so that an encoder with c bins has
-        exactly one for each.
+        A real reading becomes its position in the range, an angle its fraction of a full turn in [0, 1), a binary
+        reading 0 or 1. Category i of c becomes (i + 0.5) / c, the middle of bin i of c, so that an encoder with c bins
+        has exactly one bin per category.
 
-        Raises an error that names sensor, row and what is allowed for anything else. In a compiled or exported graph no
-        value can raise: there all readings, infinite ones too, are clipped, categories are the nearest one, and an
-        infinite angle is one that was not observed.
+        Raises `ValueError` that names sensor, row and the valid readings. A compiled or exported graph cannot raise:
+        there, all readings, including infinite ones, are clipped, categories are rounded to the nearest one, and an
+        infinite angle counts as not observed.
         """
         rows, low, high = self._checked(readings)
-        return (rows - low) / (high - low) if self._all_real else placed(self.sensors, rows)
+        return (rows - low) / (high - low) if self._all_real else to_unit_interval(self.sensors, rows)
 
     def check_bins(self, bins: int) -> None:
-        """Raise `ValueError` for a sensor whose range cannot be parted into so many bins of equal width."""
+        """Raise `ValueError` for a sensor whose range float64 cannot divide into `bins` bins of equal width."""
         for sensor in self.sensors:
             if not sensor.choices and bins > most_parts(sensor.low, sensor.high):
                 raise ValueError(
                     f"sensor {sensor.name!r}: {bins} bins of the range [{sensor.low}, {sensor.high}] cannot be told "
-                    "apart in float64; take fewer, or a range of another width or nearer to 0"
+                    "apart in float64; take fewer bins, or a wider range, or one nearer to 0"
                 )
 
     def numeric(self, readings: Any) -> Float64[Tensor, "batch n"]:
-        """Readings as float64 rows, with the indices of text; raises for unknown text, but looks at no numbers."""
+        """Readings as float64 rows, with text replaced by its index. Raises for unknown text; checks no numbers."""
         names = [sensor.name for sensor in self.sensors]
         labels = any(sensor.labels for sensor in self.sensors)
         return _rows(readings, len(names), "sensor readings", names, self._without_text if labels else None)
 
     def check_readings(self, readings: Any) -> Float64[Tensor, "batch n"]:
-        """Readings as float64 rows, clipped where a sensor says so, angles within their range; raises if any is wrong.
+        """Valid readings as float64 rows: clipped for sensors that clip, angles wrapped, text replaced by its index.
 
-        Text becomes its index, see `numeric`.
+        Raises `ValueError` that names sensor, row and the valid readings.
         """
         return self._checked(readings)[0]
 
     def _checked(self, readings: Any) -> tuple[Tensor, Tensor, Tensor]:
-        """See `check_readings`; the least and the greatest value of each sensor too."""
+        """The rows of `check_readings`, and the bounds `low` and `high` of each sensor."""
         rows = self.numeric(readings)
         low, high = self._bounds(self.sensors, rows.device)
         if not torch.compiler.is_compiling():
             inside = (rows >= low) & (rows <= high)
-            valid = inside if self._all_real else allowed(self.sensors, rows, inside)
+            valid = inside if self._all_real else valid_readings(self.sensors, rows, inside)
             if (inside & valid).all():
                 return rows, low, high
             self._refuse(rows, ~valid & ~rows.isnan())
         if self._all_real:
             return torch.minimum(torch.maximum(rows, low), high), low, high
-        return settled(self.sensors, rows, low, high), low, high
+        return canonical(self.sensors, rows, low, high), low, high
 
     @property
     def _all_real(self) -> bool:
         return all(sensor.kind == "real" for sensor in self.sensors)
 
     def _refuse(self, rows: Tensor, wrong: Tensor) -> None:
-        """Raise if a reading is infinite, or `wrong` and its sensor does not clip."""
-        strict = torch.tensor([s.beyond == "error" for s in self.sensors], device=rows.device)
+        """Raise `ValueError` if a reading is infinite, or `wrong` for a sensor that does not clip."""
+        strict = torch.tensor([s.out_of_range == "error" for s in self.sensors], device=rows.device)
         wrong = rows.isinf() | (wrong & strict)
         if wrong.any():
             row, column = wrong.nonzero()[0].tolist()
@@ -127,12 +127,12 @@ class Schema:
             value = rows[row, column].item()
             clips = sensor.kind == "real" and not np.isinf(value)
             raise ValueError(
-                f"sensor {sensor.name!r} reads {value:g} in row {row}; {sensor.described()}"
-                + (" (declare it with beyond='clip' to accept the nearest bound)" if clips else "")
+                f"sensor {sensor.name!r} reads {value:g} in row {row}; {sensor.describe()}"
+                + (" (declare it with out_of_range='clip' to accept the nearest bound)" if clips else "")
             )
 
     def _without_text(self, table: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-        """A copy of a table of objects in which the text of categorical sensors is its index."""
+        """A copy of a table of objects, with the text of categorical sensors replaced by its index."""
         names = [sensor.name for sensor in self.sensors]
         _check_shape(table.shape, len(names), "sensor readings", names)
         table = table.copy()
@@ -143,14 +143,17 @@ class Schema:
                     continue
                 if value not in labels:
                     raise ValueError(
-                        f"sensor {sensor.name!r} reads the text {str(value)!r:.80} in row {row}; {sensor.described()}"
+                        f"sensor {sensor.name!r} reads the text {str(value)!r:.80} in row {row}; {sensor.describe()}"
                         + ("" if labels else " (rows of numbers and text are lists, arrays of objects or data frames)")
                     )
                 column[row] = labels[value]
         return table
 
     def command_levels(self, commands: Any) -> Int64[Tensor, "batch m"]:
-        """The nearest level of each command (halves up). Raises, naming actuator and row, if one is not in range."""
+        """The nearest level of each command; halves are rounded up.
+
+        Raises `ValueError`, naming actuator and row, for a command out of range.
+        """
         rows = _rows(commands, len(self.actuators), "commands", [a.name for a in self.actuators])
         low, high = self._bounds(self.actuators, rows.device)
         wrong = ~((rows >= low) & (rows <= high))
@@ -158,14 +161,14 @@ class Schema:
             row, column = wrong.nonzero()[0].tolist()
             actuator = self.actuators[column]
             raise ValueError(
-                f"actuator {actuator.name!r} is told {rows[row, column].item():g} in row {row}; "
+                f"actuator {actuator.name!r} has the command {rows[row, column].item():g} in row {row}; "
                 f"its range is [{actuator.low:g}, {actuator.high:g}]{' ' + actuator.unit if actuator.unit else ''}"
             )
         steps = torch.tensor([a.levels - 1 for a in self.actuators], dtype=torch.float64, device=rows.device)
         return ((rows - low) / (high - low) * steps + 0.5).floor().to(torch.int64)
 
     def command_values(self, levels: Int64[Tensor, "batch m"]) -> Float64[Tensor, "batch m"]:
-        """The command that each level stands for."""
+        """The command of each level."""
         low, high = self._bounds(self.actuators, levels.device)
         steps = torch.tensor([a.levels - 1 for a in self.actuators], dtype=torch.float64, device=levels.device)
         return low + (high - low) * levels.to(torch.float64) / steps
@@ -181,9 +184,9 @@ def _rows(
 ) -> Float64[Tensor, "batch columns"]:
     given = column_names(values)
     if read_text is not None and given is not None and len(given) == columns:
-        # Before text is looked for in columns that may be other ones.
+        # Checked first, since wrong columns would give misleading errors about their text.
         compare_names(given, names, what)
-    rows = numbers(values, what, read_text)
+    rows = to_float64(values, what, read_text)
     _check_shape(rows.shape, columns, what, names)
     if given is not None:
         compare_names(given, names, what)

@@ -1,4 +1,4 @@
-"""The codebooks that behaviours share, so that their programs can be added."""
+"""The codebooks that encode readings and commands."""
 
 import copy
 from collections.abc import Mapping
@@ -9,27 +9,33 @@ from jaxtyping import Float64, Int64, Shaped
 from torch import Tensor, nn
 
 import torchvsa
+from behaviours.default_encoder import check_distinguishable, check_value_bins, default_encoder
+from behaviours.options import as_int
 from behaviours.schema import Schema
-from behaviours.storage import Layout, check_layout, naming
-from behaviours.suiting import check_told_apart, check_value_bins, default_encoder
+from behaviours.storage import Layout, check_layout, error_context
 from torchvsa import MAP, VSA, Part, Protection, Unprotected
-from torchvsa._checks import whole_number
 from torchvsa.encoders import Balanced, Encoder, Sum, ValueEncoder
 
 
 class Space(nn.Module):
     """Encode readings as conditions and commands as results, with one set of random codebooks.
 
-    Give an `encoder` (which holds its architecture), or a `vsa` on which the default encoder is made, or neither. By
-    default conditions are 4,000 integers that each ask one or two sensors a question that suits their kinds
-    (`ThresholdFeatures`), unprotected, and the levels of the actuators have `Balanced` codes: what did best on robots
-    for which nothing was tuned.
-    `command_codes` encodes the levels of the actuators. Parts that are plans, without codebooks of their own, are
-    copied and drawn from `seed`: encoder first, then the codes of commands, then the protection. The same seed draws
-    the same codebooks.
+    Programs can be added if they were learned over the same space. Parts that have no codebooks yet are copied, and
+    their codebooks are drawn from `seed`: first the encoder, then the codes of commands, then the protection. The same
+    seed draws the same codebooks.
 
-    Raises `ValueError` for parts of different architectures or numbers of sensors, and for an encoder that cannot tell
-    the values of a categorical or binary sensor apart.
+    Args:
+        schema: The sensors and actuators.
+        encoder: Encodes readings; it holds its architecture. By default `ThresholdFeatures` with one or two sensors per
+            dimension, which did best on robots for which nothing was tuned.
+        vsa: The architecture of the default encoder; by default `MAP(4000, dtype=torch.int8)`. Give `encoder` or `vsa`.
+        protection: By default none.
+        seed: A whole number.
+        command_codes: Encodes the levels of the actuators; by default `Balanced` codes.
+
+    Raises:
+        ValueError: For parts of different architectures or numbers of sensors, and for an encoder that has the same
+            code for two values of a categorical or binary sensor.
     """
 
     def __init__(
@@ -42,9 +48,7 @@ class Space(nn.Module):
         command_codes: ValueEncoder | None = None,
     ) -> None:
         super().__init__()
-        self.schema, self.seed = schema, whole_number(seed, "seed is a whole number")
-        if not 0 <= self.seed < 2**63:
-            raise ValueError(f"seed is a whole number in [0, 2^63); got {seed!r}")
+        self.schema, self.seed = schema, as_int("seed", seed, 0, 2**63 - 1)
         _check_kinds(encoder, vsa, protection, command_codes)
         sensors, actuators = len(schema.sensors), schema.actuators
         if encoder is None:
@@ -56,29 +60,28 @@ class Space(nn.Module):
         check_value_bins(schema, encoder)
         self.vsa = encoder.vsa
         most = max(actuator.levels for actuator in actuators)
-        results = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
-        if results.bins != most:
-            raise ValueError(f"the codes of commands are for {results.bins} levels; the schema has {most}")
+        result_encoder = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
+        if result_encoder.bins != most:
+            raise ValueError(f"the codes of commands are for {result_encoder.bins} levels; the schema has {most}")
         protection = protection or Unprotected(self.vsa)
         generator = torch.Generator().manual_seed(self.seed)
         self.encoder = _drawn(encoder, self.vsa, generator)
-        check_told_apart(schema, self.encoder)
-        self.results = _drawn(results, self.vsa, generator)
+        check_distinguishable(schema, self.encoder)
+        self.result_encoder = _drawn(result_encoder, self.vsa, generator)
         self.protect = _drawn(protection, self.vsa, generator)
 
-    # -- readings ---------------------------------------------------------------------------------------
-
     def cells(self, readings: Any, episodes: Int64[Tensor, "N"] | None = None) -> Shaped[Tensor, "batch w"]:
-        """What of each row of readings `[B, n]` matters to the encoder, see `Encoder.cells`; raises for invalid ones.
+        """The cells that the encoder derives from readings `[B, n]`, see `Encoder.cells`.
 
-        An encoder with a memory needs `episodes`, which say what run each row comes from: see `History.windows`.
+        An encoder of past readings needs `episodes`, the run of each row, see `History.windows`. Raises `ValueError`
+        for invalid readings.
         """
         x = self.schema.normalise(readings).to(self.device)
         if self.encoder.width != self.encoder.sensors:
             if episodes is None:
                 raise ValueError(
-                    "these behaviours remember past readings: give the episodes of recorded rows, or use start() and "
-                    "step() for live ones"
+                    "the encoder uses past readings: give the episodes of recorded rows, or use start() and step() for "
+                    "live ones"
                 )
             x = self.encoder.windows(x, episodes.to(self.device))
         return self.encoder.cells(x)
@@ -88,42 +91,38 @@ class Space(nn.Module):
         return self.protect(self.encoder.encode(cells))
 
     def start(self, batch: int) -> Float64[Tensor, "batch past n"]:
-        """What is remembered of past readings before the first step."""
+        """The past readings before the first step."""
         return self.encoder.start(batch).to(self.device)
 
     def step(
         self, readings: Any, past: Float64[Tensor, "batch past n"]
     ) -> tuple[Shaped[Tensor, "batch w"], Float64[Tensor, "batch past n"]]:
-        """The cells of live readings `[B, n]` after `past`, and the past of the next step."""
+        """The cells of live readings `[B, n]`, given the readings `past`, and the past of the next step."""
         x, past = self.encoder.step(self.schema.normalise(readings).to(self.device), past)
         return self.encoder.cells(x), past
 
-    # -- results ----------------------------------------------------------------------------------------
-
     def items(self, levels: Int64[Tensor, "k m"]) -> Shaped[Tensor, "k d"]:
         """The hypervector of each result, a row of one level per actuator."""
-        return self.results.encode(levels)
+        return self.result_encoder.encode(levels)
 
     @property
     def device(self) -> torch.device:
-        """Where the codebooks are."""
-        return self.results.roles.device
-
-    # -- the space as a value ---------------------------------------------------------------------------
+        """The device of the codebooks."""
+        return self.result_encoder.roles.device
 
     def config(self) -> dict[str, Any]:
-        """What `Space.from_config` needs, beside the tensors, to make an equal space."""
+        """Plain values from which, with the codebooks, `Space.from_config` makes an equal space."""
         return {
             "schema": self.schema.to_dict(),
             "vsa": self.vsa.config(),
             "encoder": self.encoder.config(),
-            "command_codes": self.results.value.config(),
+            "command_codes": self.result_encoder.value.config(),
             "protection": self.protect.config(),
             "seed": self.seed,
         }
 
     def same_as(self, other: "Space") -> bool:
-        """Whether both encode everything alike: equal configurations and equal codebooks, wherever they are."""
+        """Whether configurations and codebooks are equal; they may be on different devices."""
         if self is other:
             return True
         mine, theirs = self.state_dict(), other.state_dict()
@@ -135,53 +134,57 @@ class Space(nn.Module):
 
     @staticmethod
     def layout(config: Mapping[str, Any]) -> Layout:
-        """The types and shapes of the codebooks of a space with this configuration, found without making it."""
+        """The types and shapes of the codebooks of a space with this configuration, without creating it."""
         _, _, parts = _plans(config)
         return _layout(parts)
 
     @classmethod
     def from_config(cls, config: Mapping[str, Any], codebooks: Mapping[str, Tensor] | None = None) -> Self:
-        """The inverse of `config`; parts are looked up by name, nothing in it is run.
+        """Make the space that `config` describes; parts are found by registered name, and no code is run.
 
-        Without `codebooks` they are drawn from the seed. Raises `ValueError` naming what does not fit; codebooks are
-        compared with the configuration before anything is made.
+        Args:
+            config: A configuration, see `config`.
+            codebooks: The codebooks by name; without them they are drawn from the seed.
+
+        Raises:
+            ValueError: Naming what is wrong. Codebooks are compared with the configuration before anything is created.
         """
         schema, vsa, parts = _plans(config)
         if codebooks is not None:
             check_layout(codebooks, _layout(parts))
             for name, part in parts.items():
-                start = f"{name}."
-                with naming(name):
-                    part.take({key.removeprefix(start): t for key, t in codebooks.items() if key.startswith(start)})
-        results: Any = parts["results"]
-        space = cls(schema, parts["encoder"], vsa, parts["protect"], config["seed"], results.value)  # type: ignore[arg-type]
-        space.results = results if results.drawn else space.results
+                prefix = f"{name}."
+                with error_context(name):
+                    part.take({key.removeprefix(prefix): t for key, t in codebooks.items() if key.startswith(prefix)})
+        result_encoder: Any = parts["result_encoder"]
+        space = cls(schema, parts["encoder"], vsa, parts["protect"], config["seed"], result_encoder.value)  # type: ignore[arg-type]
+        space.result_encoder = result_encoder if result_encoder.drawn else space.result_encoder
         return space
 
 
 def _layout(parts: Mapping[str, Part]) -> Layout:
-    return {f"{name}.{key}": wanted for name, part in parts.items() for key, wanted in part.layout().items()}
+    return {f"{name}.{key}": spec for name, part in parts.items() for key, spec in part.layout().items()}
 
 
 def _plans(config: Mapping[str, Any]) -> tuple[Schema, VSA, dict[str, Part]]:
-    """The parts that a configuration describes, without codebooks: they take no memory."""
-    with naming("schema"):
+    """The parts that a configuration describes, without codebooks, so that they take no memory."""
+    with error_context("schema"):
         schema = Schema.from_dict(config["schema"])
-    with naming("vsa"):
+    with error_context("vsa"):
         vsa = torchvsa.architecture(**config["vsa"])
     parts: dict[str, Part] = {}
-    with naming("encoder"):
+    with error_context("encoder"):
         parts["encoder"] = torchvsa.encoders.encoder(config["encoder"], vsa)
-    with naming("command_codes"):
+    with error_context("command_codes"):
         values = torchvsa.encoders.value_encoder(config["command_codes"], vsa)
-        parts["results"] = Sum(values, sensors=len(schema.actuators))
-    with naming("protection"):
+        parts["result_encoder"] = Sum(values, sensors=len(schema.actuators))
+    with error_context("protection"):
         parts["protect"] = torchvsa.protection(config["protection"], vsa)
     return schema, vsa, parts
 
 
 def _drawn(part: Any, vsa: VSA, generator: torch.Generator) -> Any:
-    """The part itself, or if it is a plan, a copy with codebooks."""
+    """The part if it has codebooks, else a copy with drawn ones."""
     if part.vsa != vsa:
         raise ValueError(f"{type(part).__name__} works on {part.vsa}, this space on {vsa}")
     return part if part.drawn else copy.deepcopy(part).draw(generator)

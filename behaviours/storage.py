@@ -1,8 +1,8 @@
-"""Files of tensors: safetensors, written whole or not at all, and never a pickle.
+"""Read and write safetensors files. They are written completely or not at all, and contain no pickles.
 
-A file holds one metadata entry, `torchvsa`: JSON with the kind of the file, the version of its format, a description,
-and a checksum of description and tensors. The same content gives the same bytes. Files of format 2 (torchvsa 0.2.0)
-are read by all later versions.
+A file has one metadata entry, `torchvsa`: JSON with the kind of the file, the version of its format, a description,
+and a checksum of description and tensors. The same content gives the same bytes. All later versions read files of
+format 2 (torchvsa 0.2.0).
 """
 
 import hashlib
@@ -19,13 +19,13 @@ from torch import Tensor
 
 from behaviours._atomic import write_atomically
 
-__all__ = ["FORMAT", "Layout", "check_layout", "load_tensors", "naming", "save_tensors", "write_atomically"]
+__all__ = ["FORMAT", "Layout", "check_layout", "error_context", "load_tensors", "save_tensors", "write_atomically"]
 
 FORMAT = 2
-"""The version of the files that are written."""
+"""The version of the format that is written."""
 
 Layout = Mapping[str, tuple[torch.dtype, tuple[int, ...]]]
-"""Tensors by name: their types and shapes."""
+"""The type and shape of each tensor, by name."""
 
 
 def save_tensors(path: str | Path, kind: str, tensors: Mapping[str, Tensor], about: Mapping[str, Any]) -> Path:
@@ -40,7 +40,7 @@ def save_tensors(path: str | Path, kind: str, tensors: Mapping[str, Tensor], abo
 
 
 def load_tensors(path: str | Path, kind: str) -> tuple[dict[str, Tensor], dict[str, Any]]:
-    """Read what `save_tensors` wrote, into memory of its own: whatever becomes of the file, the tensors stay.
+    """Read a file that `save_tensors` wrote: its tensors, copied into memory, and its description.
 
     Raises `ValueError` if the file is something else, or was changed since it was written.
     """
@@ -50,21 +50,21 @@ def load_tensors(path: str | Path, kind: str) -> tuple[dict[str, Tensor], dict[s
     content = path.read_bytes()
     try:
         tensors = safetensors.torch.load(content)
-        # Where the tensors could be read, the header before them is sound JSON.
+        # The tensors could be read, so that the header before them is valid JSON.
         head = json.loads(content[8 : 8 + int.from_bytes(content[:8], "little")]).get("__metadata__", {})
     except (SafetensorError, ValueError, LookupError, RecursionError, AssertionError, AttributeError) as error:
         raise ValueError(f"{path} is not a readable torchvsa {kind} file: {error}") from error
     if head.get("format") == "1":
-        raise ValueError(f"{path} was written by torchvsa 0.1, whose files later versions do not read; make it anew")
+        raise ValueError(f"{path} was written by torchvsa 0.1, which this version cannot read; create it again")
     if "torchvsa" not in head:
         raise ValueError(f"{path} holds other tensors, not a torchvsa {kind}")
-    with naming(str(path)):
-        with naming("description"):
-            described = json.loads(head["torchvsa"])
-            _check_head(described, kind)
-        if described.pop("checksum", None) != checksum(described, tensors):
-            raise ValueError("the checksum does not fit: the file was changed or damaged since it was written")
-    return tensors, described["about"]
+    with error_context(str(path)):
+        with error_context("description"):
+            description = json.loads(head["torchvsa"])
+            _check_head(description, kind)
+        if description.pop("checksum", None) != checksum(description, tensors):
+            raise ValueError("the checksum is wrong: the file was changed or damaged since it was written")
+    return tensors, description["about"]
 
 
 def _check_head(head: Any, kind: str) -> None:
@@ -78,33 +78,33 @@ def _check_head(head: Any, kind: str) -> None:
 
 
 def checksum(head: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> str:
-    """SHA-256 of a description and of all names, types, shapes and bytes of the tensors."""
-    sums = hashlib.sha256(json.dumps(head, sort_keys=True).encode())
+    """The SHA-256 of a description and of the names, types, shapes and bytes of all tensors."""
+    digest = hashlib.sha256(json.dumps(head, sort_keys=True).encode())
     for name in sorted(tensors):
         tensor = tensors[name]
-        sums.update(json.dumps([name, str(tensor.dtype), list(tensor.shape)]).encode())
+        digest.update(json.dumps([name, str(tensor.dtype), list(tensor.shape)]).encode())
         if tensor.numel():
-            sums.update(tensor.reshape(-1).view(torch.uint8).numpy().data)
-    return sums.hexdigest()
+            digest.update(tensor.reshape(-1).view(torch.uint8).numpy().data)
+    return digest.hexdigest()
 
 
 def check_layout(tensors: Mapping[str, Tensor], expected: Layout) -> None:
-    """Raise `ValueError` naming a tensor that is missing, unknown, or of another type or shape than expected."""
+    """Raise `ValueError` that names a tensor that is missing, unexpected, or of another type or shape."""
     for name in sorted(expected.keys() - tensors.keys()):
         raise ValueError(f"tensor {name!r} is missing")
     for name in sorted(tensors.keys() - expected.keys()):
-        raise ValueError(f"tensor {name!r} does not belong here")
+        raise ValueError(f"tensor {name!r} is unexpected")
     for name, (dtype, shape) in expected.items():
         found = tensors[name]
         if found.dtype != dtype or tuple(found.shape) != shape:
             raise ValueError(
-                f"tensor {name!r} is {found.dtype} {list(found.shape)}; the description asks for {dtype} {list(shape)}"
+                f"tensor {name!r} is {found.dtype} {list(found.shape)}; the description expects {dtype} {list(shape)}"
             )
 
 
 @contextmanager
-def naming(what: str) -> Iterator[None]:
-    """Turn whatever wrong content of a file raises into a `ValueError` that begins with `what` it is found in."""
+def error_context(what: str) -> Iterator[None]:
+    """Convert errors about the content of a file to a `ValueError` that begins with `what`, its place in the file."""
     try:
         yield
     except KeyError as error:

@@ -1,4 +1,4 @@
-"""Tables of numbers as they are given: tensors, arrays, lists, and data frames with names of columns."""
+"""Convert tables of numbers to tensors: tensors, arrays, lists, and data frames with column names."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -11,15 +11,15 @@ from jaxtyping import Float64, Int64
 from torch import Tensor
 
 ReadText = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
-"""Puts numbers in the place of text, in a table of objects."""
+"""Replaces text by numbers in a table of objects."""
 
 
-def numbers(values: Any, what: str, read_text: ReadText | None = None) -> Float64[Tensor, "..."]:
-    """`values` as a float64 tensor; a tensor of that type as it is, anything else copied.
+def to_float64(values: Any, what: str, read_text: ReadText | None = None) -> Float64[Tensor, "..."]:
+    """`values` as a float64 tensor; a float64 tensor is returned as it is, anything else is copied.
 
-    Takes what NumPy takes, and whatever has `to_numpy`, such as a DataFrame. Booleans count as 0 and 1. `read_text` is
-    given tables with text, or of objects, first. Raises `ValueError`, which begins with `what`, for complex numbers,
-    other text, None, and rows of unequal length.
+    Accepts what NumPy accepts, and objects with `to_numpy`, such as a DataFrame. Booleans count as 0 and 1. Tables with
+    text, or of objects, are first passed through `read_text`. Raises `ValueError`, which begins with `what`, for
+    complex numbers, other text, None, and rows of unequal length.
     """
     if isinstance(values, Tensor):
         if values.is_complex():
@@ -31,7 +31,7 @@ def numbers(values: Any, what: str, read_text: ReadText | None = None) -> Float6
     return torch.from_numpy(np.array(array, dtype=np.float64, order="C"))
 
 
-def whole_numbers(values: Any, what: str) -> Int64[Tensor, "..."]:
+def to_int64(values: Any, what: str) -> Int64[Tensor, "..."]:
     """A copy of `values` as int64. Raises `ValueError`, which begins with `what`, for anything but whole numbers."""
     if isinstance(values, Tensor):
         rows = values.detach().to(torch.float64) if values.is_floating_point() else values.detach()
@@ -41,7 +41,7 @@ def whole_numbers(values: Any, what: str) -> Int64[Tensor, "..."]:
     if given.dtype.kind not in "iuf":
         raise ValueError(f"{what} must be whole numbers; got {_described(given)}")
     if given.dtype.kind != "i":
-        # NaN and infinity are no whole numbers either; 2^63 is the first that int64 cannot hold.
+        # This is true for NaN and infinity too; 2^63 is the smallest number above int64.
         wrong = ~((np.floor(given) == given) & (given >= -(2.0**63)) & (given < 2.0**63))
         if wrong.any():
             raise ValueError(f"{what} must be whole numbers; got {given[wrong].flat[0]} in row {int(wrong.argmax())}")
@@ -49,7 +49,7 @@ def whole_numbers(values: Any, what: str) -> Int64[Tensor, "..."]:
     return whole.to(values.device) if isinstance(values, Tensor) else whole
 
 
-def mask(values: Any, rows: int, what: str) -> Tensor:
+def to_mask(values: Any, rows: int, what: str) -> Tensor:
     """`values` as booleans `[rows]`. Raises `ValueError`, which begins with `what`, for indices and other lengths."""
     given = values if isinstance(values, Tensor) else _array(values, what)
     if given.dtype not in (torch.bool, np.bool_):
@@ -60,9 +60,9 @@ def mask(values: Any, rows: int, what: str) -> Tensor:
 
 
 def column_names(values: Any) -> tuple[str, ...] | None:
-    """The names of the columns of a data frame, or of a series; None where there are none, or numbers alone.
+    """The column names of a data frame or series; None if there are none, or if all of them are numbers.
 
-    Raises `ValueError` if only some of the names are strings.
+    Raises `ValueError` if some names are strings and others are not.
     """
     if isinstance(values, Tensor | np.ndarray | list | tuple) or not hasattr(values, "to_numpy"):
         return None
@@ -95,7 +95,7 @@ def compare_names(given: Sequence[str], expected: Sequence[str], what: str, whos
 
 
 def _array(values: Any, what: str, read_text: ReadText | None = None) -> np.ndarray[Any, Any]:
-    """`values` as NumPy reads them, with objects that are all numbers as floats."""
+    """`values` as a NumPy array; objects that are all numbers become floats."""
     with _readable(what):
         if isinstance(values, np.ndarray):
             array = values
@@ -105,7 +105,7 @@ def _array(values: Any, what: str, read_text: ReadText | None = None) -> np.ndar
             array = np.array(values)
     if read_text is not None and array.dtype.kind in "OU":
         with _readable(what):
-            # In lists with text NumPy turns numbers into text too, but not among objects.
+            # NumPy would convert the numbers of lists with text to text, unless the type is object.
             array = array if isinstance(values, np.ndarray) or array.dtype == object else np.array(values, dtype=object)
             array = np.ma.filled(array.astype(object), np.nan)
         array = read_text(array)
@@ -115,34 +115,34 @@ def _array(values: Any, what: str, read_text: ReadText | None = None) -> np.ndar
 
 @contextmanager
 def _readable(what: str) -> Iterator[None]:
-    """Turn whatever NumPy raises into a `ValueError` that begins with `what`."""
+    """Convert errors of NumPy to a `ValueError` that begins with `what`."""
     try:
         yield
     except (TypeError, OverflowError, RuntimeError) as error:
         raise ValueError(f"{what} cannot be read as numbers: {error}") from error
     except ValueError as error:
-        # NumPy's words for rows of unequal length, or our own.
+        # Either NumPy's message for rows of unequal length, or one raised in this module.
         raise ValueError(str(error) if what in str(error) else f"{what} cannot be read as numbers: {error}") from error
 
 
 def _frame_values(values: Any) -> np.ndarray[Any, Any]:
     try:
-        # Missing values of pandas' own types become NaN.
+        # Missing values of pandas types become NaN.
         return np.asarray(values.to_numpy(na_value=np.nan))
     except TypeError:
         return np.asarray(values.to_numpy())
 
 
 def _plain(array: np.ndarray[Any, Any], what: str) -> np.ndarray[Any, Any]:
-    """Masked values as NaN, and objects as floats if each of them is a real number."""
+    """Replace masked values by NaN, and convert objects to floats; raises `ValueError` unless all are real numbers."""
     if isinstance(array, np.ma.MaskedArray):
         array = np.ma.filled(array.astype(np.float64), np.nan)
     if array.dtype.kind != "O":
         return array
-    for place, value in np.ndenumerate(array):
+    for index, value in np.ndenumerate(array):
         if not isinstance(value, Real | np.bool_):
-            row = f" in row {place[0]}" if place else ""
-            raise ValueError(f"{what} must be real numbers (NaN where there is none); got {value!r}{row}")
+            row = f" in row {index[0]}" if index else ""
+            raise ValueError(f"{what} must be real numbers (NaN for 'not observed'); got {value!r}{row}")
     return array.astype(np.float64)
 
 

@@ -55,7 +55,7 @@ def _pairs(count: int, sensors: int) -> Demonstrations:
 
 
 def learn_one_shot(samples: int = 4000, dim: int = 4000, device: str = "cpu") -> Work:
-    """Algorithm 1, decided by equality, on random samples of 3 sensors x 20 values."""
+    """Algorithm 1, with exact novelty, on random samples of 3 sensors x 20 values."""
     space, shown = _robot(3, dim, device), _pairs(samples, 3)
     return lambda: OneShot().fit(space, shown)
 

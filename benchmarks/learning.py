@@ -17,7 +17,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     shown, space = corral.samples(count), corral.space(dim, device)
     bins, levels = space.cells(shown.sensors), space.schema.command_levels(shown.commands).to(device)
     for clip in (False, True):
-        rule, literal = OneShot(known="similarity", clip_each_step=clip), Literal(space, clip)
+        rule, literal = OneShot(novelty="similarity", clip_each_step=clip), Literal(space, clip)
         threshold = rule.sigmas / dim**0.5
         report = rule.fit(space, shown).report
 

@@ -17,7 +17,7 @@ class Literal:
 
     def __init__(self, space: Space, clip: bool) -> None:
         assert isinstance(space.protect, SelfShift)
-        record, results = cast(Record, space.encoder), cast(Record, space.results)
+        record, results = cast(Record, space.encoder), cast(Record, space.result_encoder)
         tables = (record.roles, record.codes, results.roles, results.codes, space.protect.h)
         self.sensors, self.values, self.actuators, self.commands, self.h = map(hypervectors, tables)
         self.index = torch.arange(len(self.h), device=self.h.device)

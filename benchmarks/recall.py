@@ -22,7 +22,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     """
     dim, count, batch = (256, 300, 8) if small else (4000, 20_000, 2048)
     shown, space = corral.samples(count), corral.space(dim, device)
-    rule, literal = OneShot(known="similarity"), Literal(space, clip=False)
+    rule, literal = OneShot(novelty="similarity"), Literal(space, clip=False)
     behaviour = rule.fit(space, shown)
     literal.learn(space.cells(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)

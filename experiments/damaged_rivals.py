@@ -18,13 +18,13 @@ from experiments.damage import Array, Damage, Damaged, Floats, Learner
 class Network(Learner):
     """An MLP with one hidden layer on standardised readings; its parameters are all weights and biases."""
 
-    def __init__(self, train: Demonstrations, seed: int, hidden: int, passes: int) -> None:
+    def __init__(self, train: Demonstrations, seed: int, hidden: int, epochs: int) -> None:
         readings = train.sensors.numpy()
         self.mean, self.scale = readings.mean(0), readings.std(0).clip(1e-9)
         self.classes, labels = np.unique(train.commands.numpy(), axis=0, return_inverse=True)
-        self.model = MLPClassifier((hidden,), random_state=seed, max_iter=passes)
+        self.model = MLPClassifier((hidden,), random_state=seed, max_iter=epochs)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ConvergenceWarning)  # the passes are a setting
+            warnings.simplefilter("ignore", ConvergenceWarning)  # the epochs are a setting
             # One unit for every class, also where two would share one.
             targets = np.eye(len(self.classes))[labels.ravel()]
             self.model.fit((readings - self.mean) / self.scale, targets)

@@ -98,7 +98,7 @@ def recalled(rules: Mapping[str, tuple[Space, Rule]], shown: Demonstrations) -> 
         with no_convergence_warnings():  # the recall says it
             behaviour = rule.fit(space, shown)
         asked = space.encode(conditions[single])
-        answers = torch.cat([behaviour.ask(block).commands for block in asked.split(1024)])
+        answers = torch.cat([behaviour.query(block).commands for block in asked.split(1024)])
         match = space.schema.command_levels(answers) == results[wanted[single]]
         right[name] = match.all(-1).numpy()
     age = (len(conditions) - 1 - torch.arange(len(conditions)))[single].numpy()

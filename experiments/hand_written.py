@@ -59,7 +59,7 @@ def space(vsa: VSA, seed: int) -> Space:
     thresholds = (LIGHT_MAX, LIGHT_MAX, OBSTACLE)
     sensors = [
         # The reading at a light sensor's maximum is the first that counts as dark.
-        Sensor(sensor.name, 0.0, 2 * threshold, sensor.unit, beyond="clip")
+        Sensor(sensor.name, 0.0, 2 * threshold, sensor.unit, out_of_range="clip")
         for sensor, threshold in zip(sim.SENSORS, thresholds, strict=True)
     ]
     schema = Schema(sensors, learners_schema().actuators)
@@ -83,7 +83,7 @@ def behaviour(vsa: VSA, seed: int) -> Behaviour:
     weights = _weights(vsa.readout(pairs, items)(cases), right)
     report = LearningReport("hand_written", samples=len(RULES), new=len(RULES))
     written = Behaviour(codes, vsa.superpose(pairs, weights=weights), vsa.superpose(conditions), results, report)
-    answers = codes.schema.command_levels(written.ask(cases).commands)
+    answers = codes.schema.command_levels(written.query(cases).commands)
     if (answers != results[right]).any():
         raise ValueError(
             f"no weights of the five rules make a bundle that is right in all 8 cases with {vsa} and seed {seed}; take "

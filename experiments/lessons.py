@@ -24,7 +24,7 @@ def from_file(path: str | Path) -> Demonstrations:
     """Demonstrations that were saved with `Demonstrations.save`; raises unless they fit the corral robot."""
     try:
         demonstrations = Demonstrations.load(path)
-        demonstrations.check(presets.schema(beyond="error"))
+        demonstrations.check(presets.schema(out_of_range="error"))
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from error
     return demonstrations

@@ -101,7 +101,7 @@ def over_windows(space: Space, lags: Sequence[int]) -> Space:
     past = [replace(sensor, name=f"{sensor.name}, {lag} ago") for lag in lags for sensor in space.schema.sensors]
     schema = Schema([*space.schema.sensors, *past], space.schema.actuators)
     wide = Space(schema, OfWindows(history), protection=space.protect, seed=space.seed)
-    wide.results = space.results
+    wide.result_encoder = space.result_encoder
     return wide
 
 
@@ -186,7 +186,7 @@ def _program(study: Study, memory: Memory) -> Learned:
     """One hypervector, shown disturbed demonstrations."""
     shown = study.shown.demonstrations(study.disturbances, memory)
     space = over_windows(study.space, memory.lags) if memory.lags else study.space
-    rule = Gradient(passes=study.config["passes"], seed=study.config["seed"])
+    rule = Gradient(epochs=study.config["epochs"], seed=study.config["seed"])
     with no_convergence_warnings():  # disturbed readings contradict each other; the study reports the agreement
         return Learned(Asked(rule.fit(space, shown), shown), memory)
 

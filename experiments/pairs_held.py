@@ -91,7 +91,7 @@ def measure(config: Mapping[str, Any], learner: str, dim: int, repeat: int) -> t
                 "repeat": repeat,
                 "pairs": count,
                 "recall": share,
-                "passes": report.passes,
+                "epochs": report.epochs,
                 "updates": report.updates,
                 "seconds": seconds,
             }

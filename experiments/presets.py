@@ -17,10 +17,10 @@ COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
 
 
-def schema(beyond: Literal["error", "clip"] = "clip") -> Schema:
+def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
     """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
     return Schema(
-        [Sensor(channel.name, channel.low, channel.high, channel.unit, beyond) for channel in sim.SENSORS],
+        [Sensor(channel.name, channel.low, channel.high, channel.unit, out_of_range) for channel in sim.SENSORS],
         [
             Actuator(channel.name, channel.low, channel.high, channel.unit, levels=COMMAND_LEVELS)
             for channel in sim.ACTUATORS

@@ -253,7 +253,7 @@ def _hand_written(config: Mapping[str, Any], train: Demonstrations) -> Learner:
 
 
 def _mlp(config: Mapping[str, Any], train: Demonstrations) -> Learner:
-    return Network(train, config["seed"], config["hidden"], config["mlp_passes"])
+    return Network(train, config["seed"], config["hidden"], config["mlp_epochs"])
 
 
 def _decision_tree(config: Mapping[str, Any], train: Demonstrations) -> Learner:

@@ -1,4 +1,4 @@
-"""Policies that combine the behaviours of a bank, by name."""
+"""Policies that combine the behaviours of a bank, and their registry."""
 
 from collections.abc import Callable
 
@@ -8,6 +8,6 @@ from behaviours.composition.priority import Priority
 from torchvsa.registry import Registry
 
 POLICIES: Registry[Callable[..., Policy]] = Registry("policy", {"bundle": Bundle, "priority": Priority})
-"""A policy is made of a bank and its options."""
+"""Policies by name; each is called with a bank and its options."""
 
 __all__ = ["POLICIES", "Bundle", "Policy", "Priority"]

@@ -1,4 +1,4 @@
-"""Bundling: the weighted sum of the programs is a program."""
+"""Combine behaviours by the weighted sum of their programs."""
 
 from collections.abc import Mapping
 
@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
-from behaviours.algebra import stacked
+from behaviours.algebra import stack_programs
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
@@ -14,42 +14,46 @@ from behaviours.recall import Recall
 
 
 class Bundle(Policy):
-    """One hypervector for all: `Σ wᵢ pᵢ`, asked like any single program.
+    """The weighted sum `Σ wᵢ pᵢ` of all programs of a bank, used like a single program.
 
-    Because recall is linear until the clean-up, this is voting: each result's score is the weighted sum of
-    the scores that the behaviours give it. That holds for the raw sum; clipping it would break it. The
-    speaker is the behaviour that contributes most to the winning result.
+    Recall is linear up to the clean-up, so that this is voting: the score of a result is the weighted sum of the scores
+    that the behaviours give it. This holds for the raw sum, but not for a clipped one. The speaker is the behaviour
+    that contributes most to the score of the recalled result.
 
-    `weights` default to 1 for every behaviour. A behaviour of weight 0 is left out, with its known conditions and its
-    results; it keeps its place in `names`. Integer programs with whole weights are summed exactly: in int32, or in
-    float64 where that is too small.
+    Integer programs with whole weights are summed exactly: in int32, or in float64 if int32 is too small.
 
-    Raises `ValueError` for weights that are no finite numbers or all 0, and for sums whose elements could be larger
-    than 2^53, up to which float64 holds all integers, or so small that their squares are lost.
+    Args:
+        bank: The behaviours to combine.
+        weights: Weights by name; 1 for behaviours that are not named. A behaviour of weight 0 is left out, with its
+            known conditions and results, but stays in `names`.
+
+    Raises:
+        ValueError: For weights that are not finite or are all 0, and for sums with elements that could exceed 2^53, up
+            to which float64 represents all integers, or that are so small that their squares underflow.
     """
 
     def __init__(self, bank: BehaviourBank, weights: Mapping[str, float] | None = None) -> None:
         super().__init__(bank, bank.names)
         self.weights = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
-        """One per name; plain ints if all of them are whole."""
+        """One weight per name; ints if all of them are whole."""
         if all(weight.is_integer() for weight in self.weights):
             self.weights = [int(weight) for weight in self.weights]
         if not any(self.weights):
             raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
         self.behaviour = Behaviour.sum(self.parts, self.weights)
-        """The bundle as a behaviour of its own: the same form as each of its parts."""
+        """The sum as a behaviour."""
 
     @property
     def program(self) -> Shaped[Tensor, "d"]:
         """The weighted sum of the programs."""
         return self.behaviour.program
 
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """See `Policy.ask`."""
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+        """The answer to encoded and protected conditions, see `Policy.query`."""
         scores = self.behaviour.readout()(conditions)
-        # The score of the sum is the weighted sum of the scores that the behaviours give.
-        parts = self.behaviour.readout().of(stacked([part.program for part in self.parts]))(conditions)
+        # The score of a result is the weighted sum of its scores for each behaviour.
+        parts = self.behaviour.readout().of(stack_programs([part.program for part in self.parts]))(conditions)
         weights = torch.tensor(self.weights, dtype=torch.float64, device=scores.device)
         winner = scores.argmax(-1)[:, None, None].expand(-1, len(weights), 1)
         shares = (weights * parts.gather(-1, winner)[..., 0]).masked_fill(weights == 0, -torch.inf)
-        return self.behaviour.ask(conditions)._replace(speaker=shares.argmax(-1))
+        return self.behaviour.query(conditions)._replace(speaker=shares.argmax(-1))

@@ -1,4 +1,4 @@
-"""Priority: the first behaviour that knows the condition speaks."""
+"""Combine behaviours by priority: the first one that knows the condition answers."""
 
 from collections.abc import Mapping, Sequence
 
@@ -12,10 +12,15 @@ from behaviours.recall import Recall
 
 
 class Priority(Policy):
-    """Subsumption: ask the first behaviour in `order` whose familiarity with the condition passes its threshold.
+    """Subsumption: the first behaviour in `order` whose familiarity is above its threshold answers.
 
-    Where none does, the most familiar one speaks. The similarity of a member to the sum of k unrelated
-    conditions is about 1/√k, so thresholds default to half of that.
+    If there is none, the behaviour with the highest familiarity answers. The similarity of a known condition to the sum
+    of k unrelated conditions is about 1/√k, so thresholds default to half of that.
+
+    Args:
+        bank: The behaviours to combine.
+        order: Names, from the highest priority to the lowest; by default the order in which they were learned.
+        thresholds: Thresholds by name.
 
     Source: Brooks 1986, "A robust layered control system for a mobile robot".
     """
@@ -27,20 +32,22 @@ class Priority(Policy):
         thresholds: Mapping[str, float] | None = None,
     ) -> None:
         if isinstance(order, str):
-            raise TypeError(f"order is a list of names, the first to be asked first; write [{order!r}] for {order!r}")
+            raise TypeError(f"order is a list of names, the highest priority first; write [{order!r}] for {order!r}")
         super().__init__(bank, bank.names if order is None else list(order))
-        calibrated = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
-        self.thresholds = self.per_behaviour(thresholds, calibrated, "thresholds")
+        defaults = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
+        self.thresholds = self.per_behaviour(thresholds, defaults, "thresholds")
 
-    def ask(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """See `Policy.ask`."""
-        answers = [part.ask(conditions) for part in self.parts]
+    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
+        """The answer to encoded and protected conditions, see `Policy.query`."""
+        answers = [part.query(conditions) for part in self.parts]
         familiarity = torch.stack([recall.familiarity for recall in answers])
-        knows = familiarity > torch.tensor(self.thresholds, device=familiarity.device)[:, None]
-        speaker = torch.where(knows.any(0), knows.to(torch.int8).argmax(0), familiarity.argmax(0))
+        known = familiarity > torch.tensor(self.thresholds, device=familiarity.device)[:, None]
+        speaker = torch.where(known.any(0), known.to(torch.int8).argmax(0), familiarity.argmax(0))
         rows = torch.arange(conditions.shape[0], device=speaker.device)
 
-        def spoken(field: str) -> Tensor:
+        def of_speaker(field: str) -> Tensor:
             return torch.stack([getattr(recall, field) for recall in answers])[speaker, rows]
 
-        return Recall(spoken("commands"), spoken("similarity"), spoken("margin"), spoken("familiarity"), speaker)
+        return Recall(
+            of_speaker("commands"), of_speaker("similarity"), of_speaker("margin"), of_speaker("familiarity"), speaker
+        )

@@ -6,7 +6,7 @@ from behaviours.learning.error_driven import ErrorDriven
 from behaviours.learning.gradient import Gradient
 from behaviours.learning.least_squares import LeastSquares
 from behaviours.learning.one_shot import OneShot
-from behaviours.learning.registry import RULES, check_rule
+from behaviours.learning.registry import RULES, require_rule
 from behaviours.report import LearningReport
 
 __all__ = [
@@ -18,6 +18,6 @@ __all__ = [
     "LeastSquares",
     "OneShot",
     "Rule",
-    "check_rule",
     "no_convergence_warnings",
+    "require_rule",
 ]

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from typing import TYPE_CHECKING, ClassVar
 
 from behaviours.demonstrations import Demonstrations
-from behaviours.progress import Progress, silent
+from behaviours.progress import Progress, no_progress
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import as_bipolar
@@ -14,14 +14,17 @@ if TYPE_CHECKING:
 
 
 class Rule(ABC):
-    """Turns a demonstration into a behaviour. A new rule is one class, registered in `behaviours.learning.RULES`."""
+    """A learning rule turns demonstrations into a behaviour.
+
+    A new rule is a subclass, registered in `behaviours.learning.RULES`.
+    """
 
     name: ClassVar[str]
-    counts: ClassVar[bool] = True
-    """Whether programs are sums of pairs, integers for integer codes; else they are always floats."""
+    integer_programs: ClassVar[bool] = True
+    """Whether programs are sums of pairs: integers where the codes are integers. Otherwise they are floats."""
 
-    incremental: ClassVar[bool] = False
-    """Whether it can go on from a behaviour with some of its options, see `partial_fit`."""
+    supports_partial_fit: ClassVar[bool] = False
+    """Whether `partial_fit` works, at least with some options of the rule."""
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
@@ -29,32 +32,42 @@ class Rule(ABC):
         return True
 
     @abstractmethod
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> "Behaviour":
-        """Learn one program from the demonstration. Raises for readings or commands that are not valid.
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> "Behaviour":
+        """Learn a behaviour from demonstrations.
 
-        `progress` is called with the share of the work that is done, see `behaviours.progress`. Rules that train warn
-        with `ConvergenceWarning` if the program recalls some conditions wrongly; of a condition that was shown with
-        several results only the one that it was trained to counts, or any of the most frequent ones.
+        Args:
+            space: The codebooks that encode readings and commands.
+            demonstrations: Readings and the commands that answer them.
+            progress: Called with the completed fraction of the work, see `behaviours.progress`.
+
+        Rules that train emit `ConvergenceWarning` if the program recalls some conditions wrongly. For a condition shown
+        with several results, the result that it was trained on is right, or any of its most frequent results.
+
+        Raises:
+            ValueError: For readings or commands that are not valid.
         """
 
     def partial_fit(
-        self, behaviour: "Behaviour", demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: "Behaviour", demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> "Behaviour":
-        """Go on learning: what becomes of `behaviour`, whichever rule it is from, when this is shown as well.
+        """Learn further demonstrations, starting from a behaviour.
 
-        Of earlier demonstrations only the behaviour is left: its program, known conditions and clean-up memory. New
-        results are appended to the memory in order of first insertion. Contradictions are settled within the piece,
-        and the report counts a condition as new in each piece that stores it. `behaviour` itself stays as it is.
-        `progress` and `ConvergenceWarning`, which looks at this piece alone, are as in `fit`.
+        Args:
+            behaviour: The behaviour to start from, learned by any rule; it is not changed. Its program, known
+                conditions and clean-up memory are all that is used of earlier demonstrations.
+            demonstrations: The further demonstrations. New results are appended to the memory in order of first
+                appearance. Contradictions are resolved, and conditions are counted as new, within these demonstrations.
+            progress: As in `fit`; so is `ConvergenceWarning`, for these demonstrations alone.
 
-        Raises `ValueError` where a rule, or an option of it, needs more than that.
+        Raises:
+            ValueError: If the rule, or one of its options, cannot start from a behaviour.
         """
-        raise ValueError(f"{self.name!r} cannot go on from a behaviour; show all demonstrations at once, to fit")
+        raise ValueError(f"{self.name!r} cannot continue from a behaviour; give all demonstrations at once, to fit")
 
 
-def grown(before: "Behaviour | None", piece: "Behaviour") -> "Behaviour":
-    """`piece`, whose known conditions and report take in those of the behaviour `before` it."""
+def continued(before: "Behaviour | None", behaviour: "Behaviour") -> "Behaviour":
+    """Add the known conditions and the report of the previous behaviour to `behaviour`, and return it."""
     if before is not None:
-        piece.known = piece.known + as_bipolar(before.known)
-        piece.report = before.report.then(piece.report)
-    return piece
+        behaviour.known = behaviour.known + as_bipolar(before.known)
+        behaviour.report = before.report.merged(behaviour.report)
+    return behaviour

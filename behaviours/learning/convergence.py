@@ -1,4 +1,4 @@
-"""A warning for training that leaves pairs wrong."""
+"""The warning of rules whose trained program recalls pairs wrongly."""
 
 import sys
 import warnings
@@ -7,13 +7,13 @@ from contextlib import contextmanager
 from types import FrameType
 
 _MANY = 0.05
-"""The share of contradicting rows from which on they are named; fewer hardly explain what is wrong."""
+"""The warning names contradicting rows from this share on; fewer hardly explain the wrong pairs."""
 FEW = 0.05
-"""The share of pairs that rules which fit approximately may leave wrong without a word: noise in the data is usual."""
+"""The share of wrong pairs below which approximate rules do not warn, since data are usually noisy."""
 
 
 class ConvergenceWarning(UserWarning):
-    """A rule was trained, and the program still recalls some pairs wrongly."""
+    """A trained program recalls some pairs wrongly."""
 
 
 def warn_if_wrong(
@@ -27,17 +27,17 @@ def warn_if_wrong(
     remedy: str,
     tolerated: float = 0.0,
 ) -> None:
-    """Warn if the program recalls `wrong` of its `pairs` wrongly, pointing at the line outside of this package.
+    """Warn if the program recalls `wrong` of its `pairs` wrongly. The warning points at the calling line of the user.
 
     Args:
-        rule: the name of its class.
-        wrong: the conditions that recall another result than the one that they were trained to.
-        pairs: the conditions that it was trained on.
-        contradicting: the samples that show another result than the one that their condition was trained to.
-        samples: all samples.
-        after: how long it was trained, for the message.
-        remedy: what helps where (nearly) nothing contradicts.
-        tolerated: the share of pairs that may be wrong without a warning.
+        rule: The class name of the rule.
+        wrong: The number of conditions that recall another result than they were trained on.
+        pairs: The number of conditions that were trained on.
+        contradicting: The number of samples that show another result than their condition was trained on.
+        samples: The number of all samples.
+        after: How long the program was trained, for the message.
+        remedy: What helps if (nearly) no samples contradict each other, for the message.
+        tolerated: The share of wrong pairs that causes no warning.
     """
     if wrong <= tolerated * pairs:
         return
@@ -54,13 +54,13 @@ def warn_if_wrong(
 
 @contextmanager
 def no_convergence_warnings() -> Iterator[None]:
-    """Ignore `ConvergenceWarning`, for callers who report themselves what is wrong. A decorator as well."""
+    """Ignore `ConvergenceWarning`, for callers that report wrong pairs themselves. A context manager and decorator."""
     with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
         yield
 
 
 def _frames_inside() -> int:
-    """The `stacklevel`, for the caller of this function, of the first frame outside of this package."""
+    """The `stacklevel`, as seen from the caller of this function, of the first frame outside this package."""
     package = __name__.partition(".")[0]
     frame: FrameType | None = sys._getframe(1)
     level = 1

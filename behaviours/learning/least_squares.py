@@ -1,7 +1,7 @@
-"""The program whose answers come closest to what they shall be."""
+"""Learn a program in closed form, by ridge regression."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import torch
 from jaxtyping import Float, Float64, Shaped
@@ -12,8 +12,8 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
-from behaviours.options import number, store
-from behaviours.progress import Progress, between, silent
+from behaviours.options import as_float, set_fields
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import as_bipolar, is_integer
@@ -21,54 +21,58 @@ from torchvsa._numerics import as_bipolar, is_integer
 
 @dataclass(frozen=True)
 class LeastSquares(Rule):
-    """Answer each condition with 1 for its own result and 0 for every other one, as nearly as possible.
+    """Ridge regression for the program: the target score of a condition is 1 for its result and 0 for all others.
 
-    A condition shown with several results shall answer with the share of each (`contradictions="all"`), or with
-    the `"first"`, the `"majority"` or the `"latest"` of them alone. `ridge` keeps the program short: it is the
-    weight of its squared length, in units of the squared length of one stored pair.
+    For a condition shown with several results the targets are the share of each (`contradictions="all"`), or 1 for the
+    `"first"`, the `"majority"` or the `"latest"` alone. `ridge` is the weight of the squared length of the program, in
+    units of the squared length of one stored pair.
 
-    The closed form needs a bind that acts on every dimension by itself, and real numbers; `fit` raises
-    `ValueError` for other architectures. The program is a float vector.
+    The closed form needs element-wise binding of real numbers; `fit` raises `ValueError` for other architectures. The
+    program is a float vector.
 
     Source: ridge regression, Hoerl and Kennard 1970.
     """
 
     name = "least_squares"
-    counts = False
+    integer_programs = False
 
     ridge: float = 1e-3
     contradictions: Contradictions | Literal["all"] = "all"
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions, "all")
-        store(self, ridge=number("ridge", self.ridge, 0, above=True))
+        set_fields(self, ridge=check_ridge(self.ridge))
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
-        """See `Rule.supports`: element-wise binding of real numbers."""
+        """Whether the architecture binds real numbers element by element; see `Rule.supports`."""
         return vsa.elementwise and not vsa.dtype.is_complex
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
-        """See `Rule.fit`."""
-        shown = Samples.of(space, demonstrations, between(progress, 0, 0.2))
-        samples = shown if self.contradictions == "all" else shown.settled(self.contradictions)
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
+        """Learn a behaviour, see `Rule.fit`.
+
+        Raises `ValueError` for an architecture that is not supported, and for a `ridge` with which the system has no
+        solution in floats.
+        """
+        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2))
+        samples = shown if self.contradictions == "all" else shown.resolved(self.contradictions)
         shape = len(samples.conditions), len(samples.results)
         cells = samples.condition * shape[1] + samples.result
         counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
         items = space.items(samples.results)
         targets = counts / counts.sum(1, keepdim=True)
         conditions = samples.conditions[:]
-        program = solve(space.vsa, conditions, items, targets, self.ridge, between(progress, 0.2, 0.9))
-        said = space.vsa.readout(program, items)(conditions).argmax(1)
+        program = solve(space.vsa, conditions, items, targets, self.ridge, subrange(progress, 0.2, 0.9))
+        predicted = space.vsa.readout(program, items)(conditions).argmax(1)
         report = samples.report(
             self.name,
             contradicting=int((counts.argmax(1)[shown.condition] != shown.result).sum()),
-            wrong=int((said != counts.argmax(1)).sum()),
+            wrong=int((predicted != counts.argmax(1)).sum()),
         )
         progress(1.0)
         warn_if_wrong(
             type(self).__name__,
-            int(samples.missed(said).sum()),
+            int(samples.missed(predicted).sum()),
             len(counts),
             contradicting=report.contradicting,
             samples=report.samples,
@@ -76,15 +80,15 @@ class LeastSquares(Rule):
             remedy="more dimensions (dim) or a smaller ridge",
             tolerated=FEW,
         )
-        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+        return Behaviour(space, program, samples.condition_sum(space.vsa), samples.results, report)
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
-        """Raises `ValueError`: the solution alone cannot go on."""
+        """Raises `ValueError`: the solution cannot be updated from the program alone."""
         raise ValueError(
-            "least squares cannot go on from a program: a further pair also needs the inverse covariance of all pairs "
-            "before it, d by d numbers that no behaviour keeps; show all demonstrations at once, to fit, or go on with "
+            "least squares cannot continue from a program: it also needs the covariance of all earlier pairs, d by d "
+            "numbers that a behaviour does not keep; give all demonstrations at once, to fit, or continue with "
             "ErrorDriven or Gradient"
         )
 
@@ -95,24 +99,32 @@ def solve(
     items: Shaped[Tensor, "r d"],
     targets: Float64[Tensor, "k r"],
     ridge: float,
-    progress: Progress = silent,
+    progress: Progress = no_progress,
 ) -> Float[Tensor, "d"]:
     """The program p that minimises the sum over k and r of (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
 
     `s` is the mean squared length of a pair c ⊗ r. With k·r pairs the system has k·r unknowns in the dual and d in the
-    primal form, and the smaller one is solved, in float64. `progress` is called with the share of the work that is
-    done.
+    primal form; the smaller one is solved, in float64.
 
-    Raises `ValueError` for architectures without element-wise binding of real numbers, and for a `ridge` that is not
-    above 0, or too small to solve the system.
+    Args:
+        vsa: The architecture of the hypervectors.
+        conditions: The conditions c.
+        items: The hypervectors r that they are bound with.
+        targets: The target score of each pair.
+        ridge: The weight of the squared length of p, above 0.
+        progress: Called with the completed fraction of the work.
+
+    Raises:
+        ValueError: If the architecture has no element-wise binding of real numbers, if `ridge` is not above 0, and if
+            the system has no solution in floats with it.
     """
-    ridge = number("ridge", ridge, 0, above=True)
+    ridge = check_ridge(ridge)
     if not LeastSquares.supports(vsa):
         raise ValueError(
-            f"least squares needs a bind of real numbers, element by element, which {vsa.name} lacks; "
-            "train it with ErrorDriven or Gradient"
+            f"least squares needs element-wise binding of real numbers, which {vsa.name} lacks; use ErrorDriven or "
+            "Gradient"
         )
-    # Sums of fewer than 2^24 products of -1 and +1 are exact in float32, and twice as fast.
+    # Sums of fewer than 2^24 products of -1 and +1 are exact in float32, which is twice as fast.
     exact = is_integer(conditions) and is_integer(items)
     c, r = (as_bipolar(x).to(torch.float32 if exact else torch.float64) for x in (conditions, items))
     pairs = len(c) * len(r)
@@ -122,19 +134,29 @@ def solve(
         system = (rows @ rows.T).double()
         system.diagonal().add_(weight)
         progress(0.4)
-        program = rows.double().T @ _positive(system, targets.reshape(-1), ridge)
+        program = rows.double().T @ _solve_positive_definite(system, targets.reshape(-1), ridge)
     else:
         # Element-wise binding makes the d × d matrix of all pairs a product of two small ones.
         system = ((c.T @ c) * (r.T @ r)).double()
         system.diagonal().add_(weight)
         progress(0.4)
-        program = _positive(system, (c.double() * (targets @ r.double())).sum(0), ridge)
+        program = _solve_positive_definite(system, (c.double() * (targets @ r.double())).sum(0), ridge)
     progress(1.0)
-    return program.to(torch.float64 if vsa.dtype == torch.float64 else torch.float32)
+    program = program.to(torch.float64 if vsa.dtype == torch.float64 else torch.float32)
+    if not program.isfinite().all():
+        raise ValueError(f"ridge={ridge:g} leaves no finite solution; take one nearer to 1")
+    return program
 
 
-def _positive(system: Float64[Tensor, "n n"], target: Float64[Tensor, "n"], ridge: float) -> Float64[Tensor, "n"]:
-    """Solve a system that is positive definite unless the ridge is lost in rounding."""
+def check_ridge(ridge: Any) -> float:
+    """The weight of the squared length of the program as a float. Raises `ValueError` unless it is above 0."""
+    return as_float("ridge", ridge, 0, above=True)
+
+
+def _solve_positive_definite(
+    system: Float64[Tensor, "n n"], target: Float64[Tensor, "n"], ridge: float
+) -> Float64[Tensor, "n"]:
+    """Solve a system that is positive definite, unless rounding has lost the ridge."""
     factor, failed = torch.linalg.cholesky_ex(system)
     if failed:
         raise ValueError(f"ridge={ridge:g} is too small: the system cannot be solved in float64; take a larger one")

@@ -9,38 +9,38 @@ from torch import Tensor
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
+from behaviours.learning.pair_accumulator import PairAccumulator
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
-from behaviours.learning.sums import Sums
-from behaviours.options import flag, number, store
+from behaviours.options import as_bool, as_float, set_fields
 from behaviours.ordered import first_rows, in_order_of_appearance
-from behaviours.progress import Progress, between, silent
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.report import LearningReport
 from behaviours.space import Space
 
 
 @dataclass(frozen=True)
 class OneShot(Rule):
-    """Add the pair (condition, result) of every sample whose condition is not known yet.
+    """Add the pair (condition, result) of each sample whose condition is new.
 
-    `known` decides what *known* means (line 5, isDissimilar): `"equality"` with a stored condition, or the
-    paper's `"similarity"` to knownCondHV above a threshold: `sigmas` standard deviations of the similarity
-    of unrelated hypervectors, `sigmas / √d`, unless `threshold` gives a cosine. The similarity test takes
-    some new conditions for known and, as more are stored, forgets the stored ones.
+    `novelty` says when a condition is new (line 5, isDissimilar): `"exact"`, if it differs from every stored condition,
+    or `"similarity"`, as in the paper, if its cosine with knownCondHV is at most a threshold. The threshold is `sigmas`
+    standard deviations of the similarity of unrelated hypervectors, `sigmas / √d`, unless `threshold` gives a cosine.
+    The similarity test skips some new conditions and, as more are stored, stores known ones again.
 
-    `clip_each_step` normalises program and knownCondHV after every addition, as the printed algorithm does
-    read literally; only the newest twenty or so pairs of d = 4,000 survive. By default both stay raw sums.
+    `clip_each_step` normalises program and knownCondHV after every addition, as the printed algorithm read literally
+    does; with d = 4,000 only the latest twenty or so pairs survive. By default both stay raw sums.
 
-    `contradictions`: as printed, a condition shown with several results keeps the one with which it was stored
-    (`"first"`); else each of its samples shows the `"majority"` of them (the first among equals), or the `"latest"`.
+    `contradictions` says which result of a condition shown with several is stored: the `"first"` (as in the paper), the
+    `"majority"` (ties are broken by first appearance), or the `"latest"`.
 
-    Source: Neubert et al. 2016, Algorithm 1, with `encode(a_i)` in the clean-up memory for line 10's
+    Source: Neubert et al. 2016, Algorithm 1. The clean-up memory holds `encode(a_i)` instead of line 10's
     `actuator_i ⊗ encode(a_i)`, which Algorithm 2 could not decode.
     """
 
     name = "one_shot"
-    incremental = True
+    supports_partial_fit = True
 
-    known: Literal["equality", "similarity"] = "equality"
+    novelty: Literal["exact", "similarity"] = "exact"
     sigmas: float = 4.0
     threshold: float | None = None
     clip_each_step: bool = False
@@ -48,66 +48,70 @@ class OneShot(Rule):
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions)
-        if self.known not in ("equality", "similarity"):
-            raise ValueError(f"known is decided by 'equality' or 'similarity'; got {self.known!r}")
-        store(self, sigmas=number("sigmas", self.sigmas), clip_each_step=flag("clip_each_step", self.clip_each_step))
+        if self.novelty not in ("exact", "similarity"):
+            raise ValueError(f"novelty is 'exact' or 'similarity'; got {self.novelty!r}")
+        set_fields(
+            self, sigmas=as_float("sigmas", self.sigmas), clip_each_step=as_bool("clip_each_step", self.clip_each_step)
+        )
         if self.threshold is not None:
-            store(self, threshold=number("threshold", self.threshold))
+            set_fields(self, threshold=as_float("threshold", self.threshold))
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
-        """See `Rule.fit`: the same bits as the loop over the samples, one by one."""
-        samples = Samples.of(space, demonstrations, between(progress, 0, 0.5))
-        return self._learn(space, samples, progress=between(progress, 0.5, 1))
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
+        """Learn a behaviour, see `Rule.fit`: the same bits as the printed loop over the samples."""
+        samples = Samples.of(space, demonstrations, subrange(progress, 0, 0.5))
+        return self._learn(space, samples, progress=subrange(progress, 0.5, 1))
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = silent
+        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
-        """See `Rule.partial_fit`: with contradictions settled by the first, the same bits as `fit` on all at once.
+        """Add further pairs, see `Rule.partial_fit`.
 
-        Raises `ValueError` for `known="equality"`, and if a program that was never clipped shall be clipped now.
+        With `contradictions="first"` the bits are those of `fit` on all demonstrations at once. Raises `ValueError` for
+        `novelty="exact"`, and for `clip_each_step` with a behaviour that is not clipped.
         """
-        if self.known == "equality":
+        if self.novelty == "exact":
             raise ValueError(
-                "a single hypervector does not remember which conditions it holds, so that no later piece can be "
-                "compared with them for equality; learn in pieces with known='similarity'"
+                "novelty='exact' needs all earlier conditions, which a behaviour does not keep; continue with "
+                "novelty='similarity'"
             )
         vsa = behaviour.space.vsa
         clipped = vsa.normalize(torch.zeros(vsa.dim, dtype=vsa.accumulator)).dtype
         if self.clip_each_step and behaviour.program.dtype != clipped:
             raise ValueError(
-                f"clip_each_step goes on from programs of {clipped}; this one is a sum in "
-                f"{behaviour.program.dtype}, so go on from behaviour.clipped()"
+                f"clip_each_step continues from programs of {clipped}; this one is a sum in "
+                f"{behaviour.program.dtype}, so continue from behaviour.clipped()"
             )
-        samples = Samples.of(behaviour.space, demonstrations, between(progress, 0, 0.5)).after(behaviour.results)
-        return self._learn(behaviour.space, samples, behaviour, between(progress, 0.5, 1))
+        samples = Samples.of(behaviour.space, demonstrations, subrange(progress, 0, 0.5))
+        return self._learn(
+            behaviour.space, samples.with_known_results(behaviour.results), behaviour, subrange(progress, 0.5, 1)
+        )
 
     def _learn(
-        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = silent
+        self, space: Space, shown: Samples, before: Behaviour | None = None, progress: Progress = no_progress
     ) -> Behaviour:
-        samples = shown if self.contradictions == "first" else shown.settled(self.contradictions)
-        added = Sums(space, samples, self.clip_each_step, progress)
+        samples = shown if self.contradictions == "first" else shown.resolved(self.contradictions)
+        accumulator = PairAccumulator(space, samples, self.clip_each_step, progress)
         if before is not None:
-            added.go_on(before.program, before.known)
-        if self.known == "equality":
-            # Nothing is forgotten: each condition is added where it first appears.
-            added.extend(first_rows(samples.condition))
+            accumulator.resume(before.program, before.known)
+        if self.novelty == "exact":
+            # Each condition is added at its first appearance.
+            accumulator.add(first_rows(samples.condition))
         else:
             threshold = self.sigmas / space.vsa.dim**0.5 if self.threshold is None else self.threshold
-            added.extend_where_dissimilar(threshold)
-        held = torch.arange(0 if before is None else len(before.results), device=samples.result.device)
-        results = samples.results[in_order_of_appearance(torch.cat([held, samples.result[added.rows]]))]
-        report = _count(self.name, samples, added.accepted, len(added.rows))
+            accumulator.add_where_dissimilar(threshold)
+        earlier = torch.arange(0 if before is None else len(before.results), device=samples.result.device)
+        results = samples.results[in_order_of_appearance(torch.cat([earlier, samples.result[accumulator.rows]]))]
+        report = _count(self.name, samples, accumulator.accepted, len(accumulator.rows))
         if self.contradictions != "first":
             report = replace(report, contradicting=int((samples.result != shown.result).sum()))
         if before is not None:
-            # What this piece never stored was known from before, or seemed to be.
-            piece = replace(report, presumed_known=report.falsely_known, falsely_known=0)
-            report = before.report.then(piece)
-        return Behaviour(space, added.program, added.known, results, report)
+            # Skipped conditions that were not stored here resemble earlier ones, rightly or by chance.
+            report = before.report.merged(replace(report, presumed_known=report.falsely_known, falsely_known=0))
+        return Behaviour(space, accumulator.program, accumulator.known, results, report)
 
 
 def _count(rule: str, samples: Samples, accepted: Tensor, stored: int) -> LearningReport:
-    """Tell samples apart by whether their condition had been stored before them, and with which result."""
+    """Count the samples by whether their condition was stored before them, and with which result."""
     count = len(accepted)
     rows = torch.arange(count, device=accepted.device)
     first_stored = torch.full((len(samples.conditions),), count, device=accepted.device)

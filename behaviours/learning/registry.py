@@ -1,4 +1,4 @@
-"""The learning rules, by name."""
+"""The registry of learning rules."""
 
 from typing import Any
 
@@ -14,13 +14,13 @@ RULES: Registry[type[Rule]] = Registry(
 )
 
 
-def check_rule(rule: Any) -> Rule:
-    """The rule as it is. Raises `TypeError`, saying what to write, for a name, a class, or anything else."""
+def require_rule(rule: Any) -> Rule:
+    """Return `rule` if it is a `Rule` object. Raises `TypeError`, saying what to write instead, for anything else."""
     if isinstance(rule, Rule):
         return rule
     if isinstance(rule, type) and issubclass(rule, Rule):
         raise TypeError(f"a rule is an object, not its class; write {rule.__name__}() for {rule.__name__}")
     if isinstance(rule, str) and rule in RULES:
         raise TypeError(f"a rule is an object, not its name; write {RULES.find(rule).__name__}() for {rule!r}")
-    written = ", ".join(f"{kind.__name__}()" for kind in RULES.values())
-    raise TypeError(f"a rule is an object, such as {written}; got {rule!r}")
+    examples = ", ".join(f"{kind.__name__}()" for kind in RULES.values())
+    raise TypeError(f"a rule is an object, such as {examples}; got {rule!r}")

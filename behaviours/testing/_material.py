@@ -1,4 +1,4 @@
-"""What the laws are tried on: codebooks, and demonstrations that fit them."""
+"""Spaces, readings and demonstrations for the checks."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,11 +18,11 @@ from torchvsa.encoders import Lookup, Sum
 from torchvsa.testing._laws import require, seeded
 
 _DRAWS = 100
-"""Rows among which unrelated conditions are looked for."""
+"""Random rows from which unrelated conditions are chosen."""
 
 
-def a_space() -> Space:
-    """Exact codebooks for a robot with 3 sensors of 20 values and 9 results, whose conditions are unrelated."""
+def default_space() -> Space:
+    """An integer space of a robot with 3 sensors of 20 values and 9 results, in which conditions are unrelated."""
     schema = Schema(
         [Sensor(name, 0, 20) for name in ("left", "right", "front")],
         [Actuator(name, -1, 1, levels=3) for name in ("left_motor", "right_motor")],
@@ -32,11 +32,11 @@ def a_space() -> Space:
 
 
 def readings(space: Space, count: int, seed: int = 0, unobserved: float = 0.0) -> Float64[Tensor, "count n"]:
-    """Random readings within their ranges, a share of which is `unobserved`; the first sensor always is observed."""
+    """Random readings, of which a fraction `unobserved` is NaN, but never of the first sensor."""
     drawn = torch.rand(count, len(space.schema.sensors), generator=seeded(seed), dtype=torch.float64)
     low = torch.tensor([float(sensor.low) for sensor in space.schema.sensors], dtype=torch.float64)
     high = torch.tensor([float(sensor.high) for sensor in space.schema.sensors], dtype=torch.float64)
-    # Rounding must not leave the range.
+    # Rounding could exceed the range.
     rows = torch.minimum(low + drawn * (high - low), high)
     hidden = torch.rand(rows.shape, generator=seeded(seed + 1)) < unobserved
     hidden[:, 0] = False
@@ -44,10 +44,10 @@ def readings(space: Space, count: int, seed: int = 0, unobserved: float = 0.0) -
 
 
 def pairs(space: Space, count: int, seed: int = 0) -> Demonstrations:
-    """Up to `count` pairs, each an episode of its own: conditions unrelated to each other, with random results.
+    """Up to `count` pairs of unrelated conditions and random results, each in its own episode.
 
     Conditions are unrelated if their similarities are within five standard deviations of chance, 1/√d. There is at
-    least one, and the first two have the lowest and the highest commands.
+    least one pair, and the first two have the lowest and the highest commands.
     """
     rows = readings(space, _DRAWS, seed)
     conditions = space.encode(space.cells(rows, torch.arange(_DRAWS)))
@@ -65,46 +65,46 @@ def pairs(space: Space, count: int, seed: int = 0) -> Demonstrations:
 
 
 def walk(space: Space, steps: int, robots: int) -> Float64[Tensor, "steps robots n"]:
-    """Readings of some robots over time: learned ones (see `pairs`), others, and those of which little is observed.
+    """Readings of several robots over time: readings of `pairs`, random ones, and ones with few observed sensors.
 
-    The last robot observes nothing in its first half.
+    The last robot observes nothing in the first half of the steps.
     """
     learned = pairs(space, 12).sensors
     count = steps * robots
-    which = torch.randint(len(learned), (count,), generator=seeded(3))
-    rows = torch.where(torch.rand(count, 1, generator=seeded(4)) < 0.6, learned[which], readings(space, count, 5, 0.4))
+    index = torch.randint(len(learned), (count,), generator=seeded(3))
+    rows = torch.where(torch.rand(count, 1, generator=seeded(4)) < 0.6, learned[index], readings(space, count, 5, 0.4))
     rows[torch.rand(count, generator=seeded(6)) < 0.1] = torch.nan
     sequence = rows.view(steps, robots, -1)
     sequence[: steps // 2, -1] = torch.nan
     return sequence
 
 
-def recalled(behaviour: Controller, readings: Float64[Tensor, "count n"]) -> Recall:
-    """The answer to each row as the first step of an episode, which works with a memory too."""
+def first_step(behaviour: Controller, readings: Float64[Tensor, "count n"]) -> Recall:
+    """The answer to each row as the first step of an episode, which also works for encoders of past readings."""
     return behaviour.step(readings, behaviour.start(range(len(readings))))[0]
 
 
-def correct(behaviour: Controller, shown: Demonstrations) -> bool:
-    """Whether all pairs are recalled."""
-    return torch.equal(recalled(behaviour, shown.sensors).commands.cpu(), shown.commands)
+def recalls_all(behaviour: Controller, shown: Demonstrations) -> bool:
+    """Whether the commands of all demonstrated readings are recalled."""
+    return torch.equal(first_step(behaviour, shown.sensors).commands.cpu(), shown.commands)
 
 
 def bits(tensor: Any) -> Tensor:
-    """A tensor as real numbers to compare, on the CPU."""
+    """A tensor as real numbers on the CPU, for comparison."""
     tensor = torch.as_tensor(tensor).detach().cpu().resolve_conj()
     return torch.view_as_real(tensor) if tensor.is_complex() else tensor
 
 
 def tensors(module: nn.Module) -> dict[str, Tensor]:
-    """A copy of all that a module holds."""
+    """A copy of the tensors of a module."""
     return {name: bits(tensor).clone() for name, tensor in module.state_dict().items()}
 
 
 def unchanged(module: nn.Module, before: dict[str, Tensor], what: str) -> None:
-    """Raise `AssertionError` unless the module holds what it held."""
-    now = tensors(module)
-    require(now.keys() == before.keys(), f"{what} has other tensors than before")
-    for name, tensor in now.items():
+    """Raise `AssertionError` unless the tensors of the module are those of `before`."""
+    after = tensors(module)
+    require(after.keys() == before.keys(), f"{what} has other tensors than before")
+    for name, tensor in after.items():
         require(
             tensor.dtype == before[name].dtype and tensor.numpy().tobytes() == before[name].numpy().tobytes(),
             f"{name} of {what} was changed",
@@ -113,7 +113,7 @@ def unchanged(module: nn.Module, before: dict[str, Tensor], what: str) -> None:
 
 @contextmanager
 def no_global_random_numbers(seed: int) -> Iterator[None]:
-    """Raise `AssertionError` if PyTorch's global generator, which has this seed inside, is used or set."""
+    """Seed PyTorch's global generator, and raise `AssertionError` if the body uses or seeds it."""
     with torch.random.fork_rng(devices=[]):
         torch.manual_seed(seed)
         before = torch.get_rng_state()

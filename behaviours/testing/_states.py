@@ -11,7 +11,7 @@ from torchvsa.testing._laws import require, same
 
 
 def each(function: Callable[..., Any], *states: Any) -> Any:
-    """A state built like the first, with `function` of what the states hold at each place."""
+    """Apply `function` to the corresponding leaves of states of equal structure."""
     first = states[0]
     if first is None:
         return None
@@ -19,20 +19,20 @@ def each(function: Callable[..., Any], *states: Any) -> Any:
         return {name: each(function, *(state[name] for state in states)) for name in first}
     if isinstance(first, tuple | list):
         parts = [each(function, *leaves) for leaves in zip(*states, strict=True)]
-        # A named tuple takes its fields one by one.
+        # A named tuple takes its fields as separate arguments.
         return type(first)(*parts) if hasattr(first, "_fields") else type(first)(parts)
     return function(*states)
 
 
 def leaves(state: Any) -> list[Any]:
-    """What a state holds, in order."""
+    """The tensors and arrays of a state, in order."""
     found: list[Any] = []
     each(found.append, state)
     return found
 
 
 def form(state: Any) -> Any:
-    """The structure of a state, with the types and shapes of its rows."""
+    """The structure of a state, with the type and row shape of each leaf."""
     return each(lambda leaf: (leaf.dtype, tuple(leaf.shape[1:])), state)
 
 
@@ -53,7 +53,7 @@ def rows_of(state: Any, robots: Sequence[int]) -> Any:
 
 
 def join(state: Any, more: Any) -> Any:
-    """The robots of `state`, and behind them those of `more`."""
+    """The robots of `state`, followed by those of `more`."""
     return each(_concatenated, state, more)
 
 
@@ -62,12 +62,12 @@ def _concatenated(rows: Any, more: Any) -> Any:
 
 
 def copied(state: Any) -> Any:
-    """The same numbers in memory of their own."""
+    """A copy of a state."""
     return each(lambda leaf: leaf.copy() if isinstance(leaf, np.ndarray) else leaf.clone(), state)
 
 
 def same_state(a: Any, b: Any) -> None:
-    """Raise `AssertionError` unless both hold the same numbers, in the same types, shapes and structure."""
-    require(form(a) == form(b), f"a state of {form(a)} is not one of {form(b)}")
-    for ours, theirs in zip(leaves(a), leaves(b), strict=True):
-        same(bits(ours), bits(theirs))
+    """Raise `AssertionError` unless both states have the same values, types, shapes and structure."""
+    require(form(a) == form(b), f"states have different forms: {form(a)} and {form(b)}")
+    for first, second in zip(leaves(a), leaves(b), strict=True):
+        same(bits(first), bits(second))

@@ -1,4 +1,4 @@
-"""A learning rule on trial."""
+"""A learning rule under test."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,12 +14,12 @@ from behaviours.testing._material import bits, pairs
 from torchvsa.testing._laws import require, same
 
 _PAIRS = 8
-"""Few enough for every architecture to hold in one program of 1,000 dimensions."""
+"""A program of 1,000 dimensions can store so few pairs with every architecture."""
 
 
 @dataclass(frozen=True)
 class Trial:
-    """A rule, and the codebooks over which it learns."""
+    """A rule, and the space over which it learns."""
 
     rule: Rule
     space: Space
@@ -28,15 +28,15 @@ class Trial:
         return repr(self.rule)
 
     def shown(self, seed: int = 0) -> Demonstrations:
-        """A few unrelated pairs."""
+        """Demonstrations of a few unrelated pairs."""
         return pairs(self.space, _PAIRS, seed)
 
     def fit(self, shown: Demonstrations | None = None) -> Behaviour:
-        """What the rule learns from `shown`, by default from the pairs above."""
+        """The behaviour that the rule learns from `shown`, by default from `self.shown()`."""
         return self.rule.fit(self.space, self.shown() if shown is None else shown)
 
-    def goes_on(self, before: Behaviour, shown: Demonstrations) -> Behaviour | None:
-        """What becomes of a behaviour, or None if the rule raises `ValueError`."""
+    def try_partial_fit(self, before: Behaviour, shown: Demonstrations) -> Behaviour | None:
+        """The behaviour after further demonstrations, or None if the rule raises `ValueError`."""
         try:
             return self.rule.partial_fit(before, shown)
         except ValueError:
@@ -44,18 +44,18 @@ class Trial:
 
 
 def same_program(a: Behaviour, b: Behaviour) -> None:
-    """Raise `AssertionError` unless both hold the same bits, and the same report."""
+    """Raise `AssertionError` unless both have the same tensors, bit for bit, and the same report."""
     for name in ("program", "known", "results"):
         same(bits(getattr(a, name)), bits(getattr(b, name)))
     require(a.report == b.report, f"the reports differ: {a.report} and {b.report}")
 
 
-def rows(shown: Demonstrations, numbers: Sequence[int]) -> Demonstrations:
-    """These rows, which may repeat, each as an episode of its own."""
-    which = torch.tensor(list(numbers))
-    return Demonstrations(shown.sensors[which], shown.commands[which], torch.arange(len(which)))
+def rows(shown: Demonstrations, indices: Sequence[int]) -> Demonstrations:
+    """The rows at these indices, which may repeat, each in its own episode."""
+    index = torch.tensor(list(indices))
+    return Demonstrations(shown.sensors[index], shown.commands[index], torch.arange(len(index)))
 
 
-def counted(report: LearningReport) -> int:
-    """The samples, by what became of them."""
+def count_samples(report: LearningReport) -> int:
+    """The sum of the counts of a report that partition the samples."""
     return report.new + report.re_added + report.truly_known + report.falsely_known + report.presumed_known

@@ -13,23 +13,26 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning import OneShot
 from behaviours.space import Space
 from behaviours.testing._controllers import CONTROLLER_LAWS, same_answer
-from behaviours.testing._material import a_space, pairs, readings, recalled, tensors, unchanged, walk
+from behaviours.testing._material import default_space, first_step, pairs, readings, tensors, unchanged, walk
 from torchvsa.testing._laws import check, refuses, require
 
 
 def check_policy(make: Callable[[BehaviourBank], Policy], space: Space | None = None) -> None:
-    """Check the laws of policies. Raises `AssertionError` naming the law that is broken.
-
-    Args:
-        make: A class of policies, or a function that makes one of a bank: `lambda bank: Mine(bank, option=3)`. It is
-            called several times, with banks of behaviours named `"low"` and `"high"`.
-        space: The codebooks of these behaviours; by default exact ones for 3 sensors.
+    """Check the laws of policies.
 
     Among the laws: a policy is a snapshot of the bank; equal states and readings give equal answers; a step modifies
-    neither; each robot of a batch is answered as it would be alone, whoever joins or leaves; where nothing was
-    observed nobody speaks.
+    neither of them; the answer to a robot does not depend on the other robots of the batch; where nothing was observed
+    there is no speaker.
+
+    Args:
+        make: A policy class, or a function that makes a policy from a bank: `lambda bank: MyPolicy(bank, option=3)`. It
+            is called several times, with banks of behaviours named `"low"` and `"high"`.
+        space: The space of these behaviours; by default an integer one of 3 sensors.
+
+    Raises:
+        AssertionError: Naming the broken law.
     """
-    case = _Case(make, a_space() if space is None else space)
+    case = _Case(make, default_space() if space is None else space)
     check(case, (_it_is_a_policy_of_its_bank, *map(_of_the_policy, CONTROLLER_LAWS), *_LAWS))
 
 
@@ -42,7 +45,7 @@ class _Case:
         return getattr(self.make, "__qualname__", repr(self.make))
 
     def bank(self, turn: int = 0) -> BehaviourBank:
-        """Two behaviours of 6 conditions each (or as many as are unrelated), whose results are turned on by `turn`."""
+        """Two behaviours of up to 6 unrelated conditions each; their results are rotated by `turn`."""
         shown = pairs(self.space, 12)
         half = (len(shown) + 1) // 2
         low = torch.arange(len(shown)) < half
@@ -67,7 +70,7 @@ def _of_the_policy(law: Callable[[Controller], None]) -> Callable[[_Case], None]
 def _it_is_a_policy_of_its_bank(case: _Case) -> None:
     bank = case.bank()
     policy = case.make(bank)
-    require(isinstance(policy, Policy), f"{type(policy).__name__} is no subclass of Policy")
+    require(isinstance(policy, Policy), f"{type(policy).__name__} is not a subclass of Policy")
     require(policy.space is bank.space, "its space is not that of its bank")
     require(set() < set(policy.names) <= set(bank.names), f"it combines {policy.names} of {bank.names}")
 
@@ -78,30 +81,32 @@ def _the_speaker_is_one_of_its_names(case: _Case) -> None:
     for rows in walk(case.space, 8, 5):
         recall, state = policy.step(rows, state)
         speaker = recall.speaker
-        require(speaker is not None and speaker.shape == (5,), "there is no speaker for each robot")
+        require(speaker is not None and speaker.shape == (5,), "there is not one speaker per robot")
         assert speaker is not None
         require(speaker.dtype == torch.int64, f"speakers are {speaker.dtype}")
-        silent = recall.commands.isnan().all(1)
-        require((speaker[silent] == -1).all(), "somebody speaks where no commands are given")
-        spoken = speaker[~silent]
-        require(((spoken >= 0) & (spoken < len(policy.names))).all(), f"speakers {spoken.tolist()} of {policy.names}")
+        unanswered = recall.commands.isnan().all(1)
+        require((speaker[unanswered] == -1).all(), "there is a speaker where there are no commands")
+        answered = speaker[~unanswered]
+        require(
+            ((answered >= 0) & (answered < len(policy.names))).all(), f"speakers {answered.tolist()} of {policy.names}"
+        )
 
 
-def _an_empty_bank_has_nothing_to_combine(case: _Case) -> None:
+def _an_empty_bank_raises_value_error(case: _Case) -> None:
     refuses(ValueError, lambda: case.make(BehaviourBank(case.space)))
 
 
 def _a_policy_is_a_snapshot(case: _Case) -> None:
     bank, rows = case.bank(), torch.cat([pairs(case.space, 12).sensors, readings(case.space, 20, 8)])
     policy = case.make(bank)
-    before, names = recalled(policy, rows), list(policy.names)
+    before, names = first_step(policy, rows), list(policy.names)
     bank.learn("low", pairs(case.space, 5, seed=9), OneShot())
     bank.learn("new", pairs(case.space, 3, seed=10), OneShot())
-    same_answer(recalled(policy, rows), before)
+    same_answer(first_step(policy, rows), before)
     require(policy.names == names, f"its names {names} became {policy.names}")
 
 
-def _its_bank_stays_as_it_is(case: _Case) -> None:
+def _the_bank_is_not_changed(case: _Case) -> None:
     bank = case.bank()
     before, names = tensors(bank), bank.names
     policy = case.make(bank)
@@ -112,17 +117,17 @@ def _its_bank_stays_as_it_is(case: _Case) -> None:
     require(bank.names == names, f"the bank's names {names} became {bank.names}")
 
 
-def _a_state_dict_carries_what_it_answers_by(case: _Case) -> None:
+def _a_state_dict_determines_the_answers(case: _Case) -> None:
     policy, other = case.policy(), case.policy(turn=1)
     rows = torch.cat([pairs(case.space, 12).sensors, readings(case.space, 20, 8)])
     other.load_state_dict(policy.state_dict())
-    same_answer(recalled(other, rows), recalled(policy, rows))
+    same_answer(first_step(other, rows), first_step(policy, rows))
 
 
 _LAWS: tuple[Callable[[_Case], None], ...] = (
     _the_speaker_is_one_of_its_names,
-    _an_empty_bank_has_nothing_to_combine,
+    _an_empty_bank_raises_value_error,
     _a_policy_is_a_snapshot,
-    _its_bank_stays_as_it_is,
-    _a_state_dict_carries_what_it_answers_by,
+    _the_bank_is_not_changed,
+    _a_state_dict_determines_the_answers,
 )

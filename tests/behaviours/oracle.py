@@ -62,8 +62,8 @@ class Encoder:
         return cls(
             numbers(space.encoder.roles),
             numbers(space.encoder.codes),
-            numbers(space.results.roles),
-            numbers(space.results.codes),
+            numbers(space.result_encoder.roles),
+            numbers(space.result_encoder.codes),
             [(s.low, s.high) for s in space.schema.sensors],
             [(a.low, a.high, a.levels) for a in space.schema.actuators],
             space.encoder.name,
@@ -160,7 +160,7 @@ def learn(
     encoder: Encoder,
     sensors: list[list[float]],
     commands: list[list[float]],
-    known: str = "equality",
+    novelty: str = "exact",
     threshold: float = math.nan,
     clip_each_step: bool = False,
 ) -> Learned:
@@ -176,7 +176,7 @@ def learn(
         condition_hv = encoder.condition(s)  # 3
         result_hv = encoder.result(a)  # 4
         protected = encoder.protect(condition_hv)
-        if known == "equality":
+        if novelty == "exact":
             dissimilar = not any(np.array_equal(protected, condition) for condition, _ in stored)
         else:
             dissimilar = not stored or cosine(learned.known_cond_hv, protected) <= threshold

@@ -59,7 +59,7 @@ def query(behaviour: Behaviour, reading: list[float]) -> Answer:
     commands = []
     for i, actuator in enumerate(space.schema.actuators):  # 4
         levels = list(dict.fromkeys(behaviour.results[:, i].tolist()))
-        noisy_value = vsa.unbind(result, space.results.roles[i])  # 5
-        level = levels[clean_up(space.results.codes[levels], noisy_value).winner]  # 6
+        noisy_value = vsa.unbind(result, space.result_encoder.roles[i])  # 5
+        level = levels[clean_up(space.result_encoder.codes[levels], noisy_value).winner]  # 6
         commands.append(actuator.low + (actuator.high - actuator.low) * level / (actuator.levels - 1))  # 7
     return Answer(commands, found.similarity, found.margin, cosine(protected, behaviour.known))

@@ -159,7 +159,7 @@ def test_wrong_sums_are_refused() -> None:
     with pytest.raises(ValueError, match="finite number"):
         _ = True * seek
     for nothing in (lambda: seek - seek, lambda: 0 * seek, lambda: seek + bank["avoid"] - (bank["avoid"] + seek)):
-        with pytest.raises(ValueError, match=r"nothing is left|at least one"):
+        with pytest.raises(ValueError, match=r"cancel each other|at least one"):
             nothing()
     with pytest.raises(ValueError, match="different spaces"):
         _ = seek + OneShot().fit(space(500, seed=1), random_pairs(4))

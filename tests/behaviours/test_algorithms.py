@@ -57,7 +57,7 @@ def cases(draw: st.DrawFn) -> Case:
     results = draw(st.lists(command, min_size=1, max_size=4))
     rows = draw(st.lists(st.tuples(st.sampled_from(conditions), st.sampled_from(results)), min_size=1, max_size=16))
     rule = OneShot(
-        draw(st.sampled_from(["equality", "similarity"])),
+        draw(st.sampled_from(["exact", "similarity"])),
         threshold=draw(st.sampled_from([None, -0.5, 0.0, 0.1, 0.4, 0.7, 1.0])),
         clip_each_step=draw(st.booleans()),
     )
@@ -68,7 +68,7 @@ def cases(draw: st.DrawFn) -> Case:
 def learned(case: Case) -> tuple[oracle.Encoder, oracle.Learned]:
     encoder, rule = oracle.Encoder.of(case.space), case.rule
     threshold = rule.sigmas / encoder.dim**0.5 if rule.threshold is None else rule.threshold
-    return encoder, oracle.learn(encoder, case.sensors, case.commands, rule.known, threshold, rule.clip_each_step)
+    return encoder, oracle.learn(encoder, case.sensors, case.commands, rule.novelty, threshold, rule.clip_each_step)
 
 
 @settings(max_examples=150, deadline=None, derandomize=True)
@@ -81,7 +81,7 @@ def test_learning_is_algorithm_1(case: Case) -> None:
     np.testing.assert_array_equal(case.space.items(behaviour.results).numpy(), expected.results)
     for i, values in enumerate(expected.values):
         levels = in_order_of_appearance(behaviour.results[:, i])
-        np.testing.assert_array_equal(case.space.results.codes[levels].numpy(), values)
+        np.testing.assert_array_equal(case.space.result_encoder.codes[levels].numpy(), values)
     report = behaviour.report
     for count in ("new", "truly_known", "falsely_known", "re_added", "contradicting"):
         assert getattr(report, count) == getattr(expected, count), count
@@ -122,7 +122,7 @@ def test_a_long_demonstration_that_forgets(clip: bool) -> None:
 
 @pytest.mark.parametrize("dtype", ["int8", "float32"])
 @pytest.mark.parametrize(
-    "rule", [OneShot(), OneShot("similarity", clip_each_step=True), ErrorDriven(passes=3)], ids=str
+    "rule", [OneShot(), OneShot("similarity", clip_each_step=True), ErrorDriven(epochs=3)], ids=str
 )
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 def test_threads_and_chunks_change_no_bit(rule: Rule, dtype: str) -> None:

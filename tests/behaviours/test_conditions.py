@@ -8,7 +8,7 @@ from robots import random_pairs, same_bits, space
 
 from behaviours import RULES, Demonstrations, Gradient
 from behaviours.learning import conditions
-from behaviours.learning.conditions import Conditions
+from behaviours.learning.conditions import LazyConditions
 from behaviours.learning.samples import Samples
 
 
@@ -19,7 +19,7 @@ def shown() -> Demonstrations:
 
 
 def rule(name: str) -> Any:
-    return Gradient(passes=3) if name == "gradient" else RULES[name]()
+    return Gradient(epochs=3) if name == "gradient" else RULES[name]()
 
 
 @pytest.mark.parametrize("name", RULES)
@@ -44,7 +44,7 @@ def test_they_are_indexed_like_a_tensor(vsa: str, monkeypatch: pytest.MonkeyPatc
     shares: list[float] = []
     lazy = Samples.of(made, shown(), shares.append)
     assert isinstance(held.conditions, torch.Tensor)
-    assert isinstance(lazy.conditions, Conditions)
+    assert isinstance(lazy.conditions, LazyConditions)
     assert shares == [1.0]
     assert torch.equal(lazy.condition, held.condition)
     assert len(lazy.conditions) == len(held.conditions)

@@ -43,7 +43,7 @@ def test_targets_of_samples(how: Any, rows: Rows) -> None:
     wanted = list(settle(rows, how).values())
     levels = samples.results[samples.targets(how)]
     assert made.schema.command_values(levels).tolist() == [COMMANDS[r] for r in wanted]
-    assert torch.equal(samples.settled(how).result, samples.targets(how)[samples.condition])
+    assert torch.equal(samples.resolved(how).result, samples.targets(how)[samples.condition])
 
 
 @pytest.mark.parametrize("name", RULES)
@@ -62,7 +62,7 @@ def test_every_rule_settles_them(name: str, how: Any) -> None:
     assert (report.samples, report.new, report.truly_known, report.wrong) == (9, 3, 6, 0)
 
 
-@pytest.mark.parametrize("rule", [LeastSquares(), Gradient(passes=3)], ids=["least_squares", "gradient"])
+@pytest.mark.parametrize("rule", [LeastSquares(), Gradient(epochs=3)], ids=["least_squares", "gradient"])
 def test_by_default_the_solvers_learn_from_all(rule: Rule) -> None:
     """Two of three is not three of three."""
     made, rows = space(500), [(0, 0), (0, 1), (0, 1)]
@@ -104,7 +104,7 @@ def test_ways_that_do_not_exist(name: str) -> None:
         if name in ("least_squares", "gradient")
         else ("'first', 'majority' or 'latest'")
     )
-    with pytest.raises(ValueError, match=f"contradictions are settled by {choices}; got 'loudest'"):
+    with pytest.raises(ValueError, match=f"contradictions is {choices}; got 'loudest'"):
         rule(contradictions="loudest")
     if "all" not in choices:
         with pytest.raises(ValueError, match="got 'all'"):

@@ -24,7 +24,7 @@ from behaviours import (
 from behaviours.learning import ConvergenceWarning, no_convergence_warnings
 from behaviours.learning.least_squares import solve
 
-TRAINED = [ErrorDriven(passes=20), Gradient(passes=30, batch=16), LeastSquares()]
+TRAINED = [ErrorDriven(epochs=20), Gradient(epochs=30, batch_size=16), LeastSquares()]
 trained = pytest.mark.parametrize("rule", TRAINED, ids=[rule.name for rule in TRAINED])
 
 
@@ -73,8 +73,8 @@ def test_the_warning_points_at_the_callers_line_from_any_depth() -> None:
     calls = [
         lambda: LeastSquares().fit(bank.space, shown),
         lambda: bank.learn("go", shown, LeastSquares()),
-        lambda: bank.partial_fit("go", shown, ErrorDriven(passes=1)),
-        lambda: bank.partial_fit("new", shown, ErrorDriven(passes=1)),
+        lambda: bank.partial_fit("go", shown, ErrorDriven(epochs=1)),
+        lambda: bank.partial_fit("new", shown, ErrorDriven(epochs=1)),
     ]
     for call in calls:
         with pytest.warns(ConvergenceWarning) as caught:
@@ -93,12 +93,12 @@ def test_conditions_held_back_are_not_counted() -> None:
     generator = torch.Generator().manual_seed(0)
     shown = Demonstrations(torch.rand(60, 3, generator=generator) * 20, torch.rand(60, 2, generator=generator) * 2 - 1)
     made = space(4000, protection={"name": "self_shift", "width": "sum"})
-    with pytest.warns(ConvergenceWarning, match=r"left \d of 42 pairs wrong after 21 passes"):
-        report = Gradient(held_back=0.3, patience=20, passes=40, batch=8).fit(made, shown).report
+    with pytest.warns(ConvergenceWarning, match=r"left \d of 42 pairs wrong after 21 epochs"):
+        report = Gradient(validation_fraction=0.3, patience=20, epochs=40, batch_size=8).fit(made, shown).report
     assert report.wrong > 10
 
 
-PIECEWISE = [OneShot("similarity"), ErrorDriven(passes=2), Gradient(passes=3)]
+PIECEWISE = [OneShot("similarity"), ErrorDriven(epochs=2), Gradient(epochs=3)]
 
 
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
@@ -114,7 +114,9 @@ def test_pieces_tell_their_progress(rule: Any) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
-@pytest.mark.parametrize("rule", [*TRAINED[1:], ErrorDriven(passes=1), Gradient(passes=1, batch=4), OneShot()], ids=str)
+@pytest.mark.parametrize(
+    "rule", [*TRAINED[1:], ErrorDriven(epochs=1), Gradient(epochs=1, batch_size=4), OneShot()], ids=str
+)
 def test_long_work_tells_several_shares(rule: Any) -> None:
     shares: list[float] = []
     rule.fit(space(64), random_pairs(1200), shares.append)
@@ -125,13 +127,13 @@ def test_long_work_tells_several_shares(rule: Any) -> None:
 
 def test_training_ends_where_it_would_not_get_there() -> None:
     shown, made = random_pairs(40), space(16)
-    with pytest.warns(ConvergenceWarning, match=r"after 2\d passes; take more dimensions \(dim\)$"):
-        early = ErrorDriven(passes=100, patience=10).fit(made, shown)
-    # The program is one of those at the end of its last 10 passes, each of which a run of that many passes ends with.
+    with pytest.warns(ConvergenceWarning, match=r"after 2\d epochs; take more dimensions \(dim\)$"):
+        early = ErrorDriven(epochs=100, patience=10).fit(made, shown)
+    # The program is one of those at the end of its last 10 epochs, each of which a run of that many epochs ends with.
     with no_convergence_warnings():
         ends: list[Behaviour] = [
-            ErrorDriven(passes=passes, patience=200).fit(made, shown)
-            for passes in range(early.report.passes - 9, early.report.passes + 1)
+            ErrorDriven(epochs=epochs, patience=200).fit(made, shown)
+            for epochs in range(early.report.epochs - 9, early.report.epochs + 1)
         ]
     shares = [correct(end, shown).mean() for end in ends]
     assert correct(early, shown).mean() == max(shares)
@@ -165,7 +167,7 @@ def test_gradients_may_be_off_around_learning(name: str, off: Any) -> None:
 
 
 @grad_off()
-@pytest.mark.parametrize("rule", [Gradient(passes=20), Gradient(passes=20, sparse=True), Gradient("hinge", passes=20)])
+@pytest.mark.parametrize("rule", [Gradient(epochs=20), Gradient(epochs=20, sparse=True), Gradient("hinge", epochs=20)])
 @pytest.mark.parametrize("vsa", ["MAP-C", "HRR", "FHRR"])
 def test_gradients_may_be_off_around_pieces(rule: Gradient, vsa: str, off: Any) -> None:
     made = space(1000, vsa, protection={"name": "self_shift", "width": "sum"})
@@ -181,8 +183,8 @@ def test_gradients_may_be_off_around_pieces(rule: Gradient, vsa: str, off: Any) 
 
 
 def test_a_learning_rate_that_is_too_high_is_told() -> None:
-    with pytest.raises(ValueError, match=r"learning_rate=1e\+25 drove the program to infinity; take a lower one"):
-        Gradient("squared", learning_rate=1e25, passes=3).fit(space(64), random_pairs(20))
+    with pytest.raises(ValueError, match=r"learning_rate=1e\+25 made the program infinite; take a lower one"):
+        Gradient("squared", learning_rate=1e25, epochs=3).fit(space(64), random_pairs(20))
 
 
 def test_a_ridge_that_is_too_small_is_told() -> None:
@@ -198,6 +200,6 @@ def test_a_ridge_that_is_too_small_is_told() -> None:
 def test_a_classifier_of_noisy_labels_says_nothing() -> None:
     rng = np.random.default_rng(0)
     readings, labels = rng.normal(size=(80, 2)), rng.integers(0, 2, 80)
-    classifier = BehaviourClassifier(dim=64, bins=4, passes=5, random_state=0).fit(readings, labels)
+    classifier = BehaviourClassifier(dim=64, bins=4, epochs=5, random_state=0).fit(readings, labels)
     assert classifier.score(readings, labels) < 1
     classifier.partial_fit(readings, labels)

@@ -22,7 +22,7 @@ def test_a_real_robot_is_learned_better_than_by_its_nearest_neighbours() -> None
     readings, commands = load_wall_following(sensors=4)
     numbers = np.unique(commands, return_inverse=True)[1][:, None]
     schema = Schema(
-        [Sensor(name, 0, 5, "m", beyond="clip") for name in ("front", "left", "right", "back")],
+        [Sensor(name, 0, 5, "m", out_of_range="clip") for name in ("front", "left", "right", "back")],
         [Actuator("command", 0, 3, levels=4)],
     )
     train = len(readings) * 4 // 5

@@ -67,7 +67,7 @@ def test_check_against_a_schema() -> None:
     Demonstrations([[0.0, math.nan, 20.0]], [[-1.0, 1.0]]).check(SCHEMA)
     with pytest.raises(ValueError, match=r"sensor 'right' reads -1 in row 0; its range is \[0, 20\]"):
         Demonstrations([[0.0, -1.0, 20.0]], [[-1.0, 1.0]]).check(SCHEMA)
-    with pytest.raises(ValueError, match="actuator 'left_motor' is told 3 in row 0"):
+    with pytest.raises(ValueError, match="actuator 'left_motor' has the command 3 in row 0"):
         Demonstrations([[0.0, 1.0, 20.0]], [[3.0, 1.0]]).check(SCHEMA)
     with pytest.raises(ShapeError, match=r"sensor readings must be rows of 3 values \(left, right, front\)"):
         Demonstrations([[0.0]], [[3.0, 1.0]]).check(SCHEMA)

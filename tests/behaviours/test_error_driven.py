@@ -45,20 +45,20 @@ def test_every_pair_has_its_margin(vsa: str, margin: float) -> None:
     assert correct(behaviour, shown).mean() == 1
 
 
-@pytest.mark.parametrize("passes", [1, 2, 3, 5])
-def test_the_report_counts_what_is_still_wrong(passes: int) -> None:
+@pytest.mark.parametrize("epochs", [1, 2, 3, 5])
+def test_the_report_counts_what_is_still_wrong(epochs: int) -> None:
     shown = random_pairs(60)
-    with pytest.warns(ConvergenceWarning, match=rf"pairs wrong.* after {passes} pass"):
-        behaviour = ErrorDriven(0.5, passes=passes).fit(space(256), shown)
+    with pytest.warns(ConvergenceWarning, match=rf"pairs wrong.* after {epochs} epoch"):
+        behaviour = ErrorDriven(0.5, epochs=epochs).fit(space(256), shown)
     lead = leads(behaviour, shown)
-    assert behaviour.report.passes == passes
+    assert behaviour.report.epochs == epochs
     assert behaviour.report.wrong == np.sum((lead < 0.5 - 1e-9) | (lead <= 0)) > 0
 
 
 def test_a_last_pass_that_sets_all_right_leaves_nothing_wrong() -> None:
     shown = Demonstrations([[1.0, 1, 1]], [[1.0, 1]])
-    report = ErrorDriven(passes=1).fit(space(256), shown).report
-    assert (report.passes, report.updates, report.wrong) == (1, 1, 0)
+    report = ErrorDriven(epochs=1).fit(space(256), shown).report
+    assert (report.epochs, report.updates, report.wrong) == (1, 1, 0)
 
 
 def perceptron_steps(space_, shown: Demonstrations, margin: float) -> Iterator[tuple[np.ndarray, bool]]:
@@ -85,10 +85,10 @@ def perceptron_steps(space_, shown: Demonstrations, margin: float) -> Iterator[t
             yield program, short
 
 
-def perceptron(space_, shown: Demonstrations, margin: float, passes: int) -> np.ndarray:
+def perceptron(space_, shown: Demonstrations, margin: float, epochs: int) -> np.ndarray:
     """The program in the end."""
     steps, sweep = perceptron_steps(space_, shown, margin), []
-    for _ in range(passes):
+    for _ in range(epochs):
         sweep = [next(steps) for _ in range(len(shown))]
         if not any(short for _, short in sweep):
             break
@@ -103,7 +103,7 @@ def test_it_is_the_sequential_perceptron_whatever_the_block(count: int, monkeypa
     expected = perceptron(made, shown, 0.49, 4)
     for block in (1, 3, 64):
         monkeypatch.setattr(module, "_BLOCK", block)
-        behaviour = ErrorDriven(0.49, passes=4).fit(made, shown)
+        behaviour = ErrorDriven(0.49, epochs=4).fit(made, shown)
         np.testing.assert_array_equal(behaviour.program.numpy(), expected)
 
 
@@ -147,7 +147,7 @@ def test_known_is_the_sum_of_the_distinct_conditions() -> None:
     twice = Demonstrations.join([shown, shown])
     made = space(128)
     expected = made.encode(made.cells(shown.sensors)).numpy().astype(int).sum(0)
-    np.testing.assert_array_equal(ErrorDriven(passes=1).fit(made, twice).known.numpy(), expected)
+    np.testing.assert_array_equal(ErrorDriven(epochs=1).fit(made, twice).known.numpy(), expected)
 
 
 def test_settings_that_make_no_sense() -> None:
@@ -155,10 +155,10 @@ def test_settings_that_make_no_sense() -> None:
         ErrorDriven(contradictions=cast(Literal["first"], "loudest"))
 
 
-def averaged(space_, shown: Demonstrations, margin: float, passes: int) -> np.ndarray:
+def averaged(space_, shown: Demonstrations, margin: float, epochs: int) -> np.ndarray:
     """The plain definition: the program after every visit, kept and averaged."""
     steps, programs = perceptron_steps(space_, shown, margin), []
-    for _ in range(passes):
+    for _ in range(epochs):
         sweep = [next(steps) for _ in range(len(shown))]
         programs += [program for program, _ in sweep]
         if not any(corrected for _, corrected in sweep):
@@ -167,13 +167,13 @@ def averaged(space_, shown: Demonstrations, margin: float, passes: int) -> np.nd
 
 
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
-@pytest.mark.parametrize(("count", "passes"), [(1, 3), (7, 1), (7, 50), (70, 2), (70, 4)])
-def test_the_average_is_that_of_all_visits(count: int, passes: int, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("count", "epochs"), [(1, 3), (7, 1), (7, 50), (70, 2), (70, 4)])
+def test_the_average_is_that_of_all_visits(count: int, epochs: int, monkeypatch: pytest.MonkeyPatch) -> None:
     shown, made = random_pairs(count), space(256)
-    expected = averaged(made, shown, 0.49, passes)
+    expected = averaged(made, shown, 0.49, epochs)
     for block in (1, 64):
         monkeypatch.setattr(module, "_BLOCK", block)
-        behaviour = ErrorDriven(0.49, passes, average=True).fit(made, shown)
+        behaviour = ErrorDriven(0.49, epochs, average=True).fit(made, shown)
         assert behaviour.program.dtype == torch.float32
         np.testing.assert_array_equal(behaviour.program.numpy(), expected)
 
@@ -182,7 +182,7 @@ def test_the_average_is_that_of_all_visits(count: int, passes: int, monkeypatch:
 def test_the_report_of_an_average_is_about_the_average(vsa: str) -> None:
     shown = random_pairs(60)
     last, mean = (ErrorDriven(0.5, average=average).fit(space(512, vsa), shown) for average in (False, True))
-    assert (last.report.passes, last.report.updates) == (mean.report.passes, mean.report.updates)
+    assert (last.report.epochs, last.report.updates) == (mean.report.epochs, mean.report.updates)
     lead = leads(mean, shown)
     # Scores of float programs: none of these leads lies within rounding of the margin.
     assert np.abs(lead - 0.5).min() > 1e-5

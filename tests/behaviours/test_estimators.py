@@ -18,7 +18,7 @@ import behaviours
 from behaviours import BehaviourClassifier, BehaviourRegressor
 from behaviours.data import load_wall_following
 
-ESTIMATORS = [BehaviourClassifier(dim=500, passes=30, random_state=0), BehaviourRegressor(dim=500, random_state=0)]
+ESTIMATORS = [BehaviourClassifier(dim=500, epochs=30, random_state=0), BehaviourRegressor(dim=500, random_state=0)]
 
 
 def checks() -> Iterator[Any]:
@@ -39,7 +39,7 @@ def test_scikit_learns_checks(estimator: Any, check: Any) -> None:
 def test_iris_in_pipeline_grid_and_folds() -> None:
     X, y = load_iris(return_X_y=True)  # noqa: N806
     folds = KFold(5, shuffle=True, random_state=0)
-    model = make_pipeline(StandardScaler(), BehaviourClassifier(dim=1000, passes=30, random_state=0))
+    model = make_pipeline(StandardScaler(), BehaviourClassifier(dim=1000, epochs=30, random_state=0))
     assert cross_val_score(model, X, y, cv=folds).mean() > 0.92
     grid = GridSearchCV(model, {"behaviourclassifier__subset": [1, 2]}, cv=folds).fit(X, y)
     assert grid.best_score_ > 0.92
@@ -74,7 +74,7 @@ def test_one_hypervector_learns_interactions() -> None:
 
 def test_probabilities_scores_and_labels_agree() -> None:
     X, y = load_iris(return_X_y=True)  # noqa: N806
-    model = BehaviourClassifier(dim=500, passes=20, random_state=1).fit(X[::-1], np.array(["c", "a", "b"])[y[::-1]])
+    model = BehaviourClassifier(dim=500, epochs=20, random_state=1).fit(X[::-1], np.array(["c", "a", "b"])[y[::-1]])
     proba, scores = model.predict_proba(X), model.decision_function(X)
     np.testing.assert_allclose(proba.sum(1), 1)
     np.testing.assert_array_equal(proba.argmax(1), scores.argmax(1))
@@ -94,13 +94,13 @@ def test_a_missing_reading_is_left_out_and_a_blind_row_refused() -> None:
     X[3] = np.nan
     with pytest.raises(ValueError, match="row 3 has no observed feature"):
         model.predict(X)
-    with pytest.raises(ValueError, match="row 3 of the demonstration has no observed sensor"):
+    with pytest.raises(ValueError, match="row 3 of the demonstrations has no observed sensor"):
         model.fit(X, y)
 
 
 def test_the_seed_decides_and_pickles_keep_it() -> None:
     X, y = load_iris(return_X_y=True)  # noqa: N806
-    one, two, three = (BehaviourClassifier(dim=300, passes=5, random_state=s).fit(X, y) for s in (0, 0, 1))
+    one, two, three = (BehaviourClassifier(dim=300, epochs=5, random_state=s).fit(X, y) for s in (0, 0, 1))
     np.testing.assert_array_equal(one.predict_proba(X), two.predict_proba(X))
     assert not np.array_equal(one.predict_proba(X), three.predict_proba(X))
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(one)).predict_proba(X), one.predict_proba(X))
@@ -109,18 +109,18 @@ def test_the_seed_decides_and_pickles_keep_it() -> None:
 def test_batches_are_learned_one_after_the_other() -> None:
     X, y = load_wall_following(4)  # noqa: N806
     order = np.random.default_rng(0).permutation(len(X))
-    model = BehaviourClassifier(dim=1000, passes=5, random_state=0)
+    model = BehaviourClassifier(dim=1000, epochs=5, random_state=0)
     for rows in np.split(order[:4000], 4):
         model.partial_fit(X[rows], y[rows], classes=np.unique(y))
     assert model.score(X[order[4000:]], y[order[4000:]]) > 0.97
     assert model.behaviour_.report.samples == 4000
-    assert model.behaviour_.report.passes == 20
+    assert model.behaviour_.report.epochs == 20
 
 
 def test_classes_may_come_later_than_they_are_named() -> None:
     X, y = load_iris(return_X_y=True)  # noqa: N806
     names = np.array(["c", "a", "b"])[y]
-    model = BehaviourClassifier(dim=500, passes=20, random_state=0)
+    model = BehaviourClassifier(dim=500, epochs=20, random_state=0)
     model.partial_fit(X[:50], names[:50], classes=["a", "b", "c"])
     assert model.classes_.tolist() == ["a", "b", "c"]
     assert model.predict(X[:50]).tolist() == ["c"] * 50
@@ -129,7 +129,7 @@ def test_classes_may_come_later_than_they_are_named() -> None:
     model.partial_fit(X[order], names[order])
     # The bins are those of the first batch, in which one class stood alone.
     assert model.score(X, names) > 0.7
-    again = BehaviourClassifier(dim=500, passes=20, random_state=0).fit(X, names)
+    again = BehaviourClassifier(dim=500, epochs=20, random_state=0).fit(X, names)
     assert again.partial_fit(X[:10], names[:10]).score(X, names) > 0.8
     again.partial_fit(X[:10], names[:10], classes=["c", "a", "b"])
 
@@ -143,13 +143,13 @@ def test_classes_may_come_later_than_they_are_named() -> None:
     ],
 )
 def test_first_batches_that_say_too_little(labels: list[int], options: Any, words: str) -> None:
-    model = BehaviourClassifier(dim=100, passes=1, random_state=0)
+    model = BehaviourClassifier(dim=100, epochs=1, random_state=0)
     with pytest.raises(ValueError, match=words):
         model.partial_fit([[0.0], [1.0]], labels, **options)
 
 
 def test_classes_stay_those_of_the_first_call() -> None:
-    model = BehaviourClassifier(dim=100, passes=1, random_state=0).partial_fit([[0.0], [1.0]], [0, 1], classes=[0, 1])
+    model = BehaviourClassifier(dim=100, epochs=1, random_state=0).partial_fit([[0.0], [1.0]], [0, 1], classes=[0, 1])
     with pytest.raises(ValueError, match=r"classes are \[0 1\] since the first call; got \[0 1 2\]"):
         model.partial_fit([[0.0]], [0], classes=[0, 1, 2])
     with pytest.raises(ValueError, match="none of the classes"):
@@ -191,10 +191,10 @@ def test_the_wall_following_set(sensors: int) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(("sensors", "at_least"), [(24, 0.96), (4, 0.985), (2, 0.99)])
 def test_a_real_robot_in_stretches_of_time(sensors: int, at_least: float) -> None:
-    # Two of the five blocks at fewer passes: the whole table takes minutes.
+    # Two of the five blocks at fewer epochs: the whole table takes minutes.
     X, y = load_wall_following(sensors)  # noqa: N806
     accuracies = []
     for train, test in list(KFold(5).split(X))[2:4]:
-        model = BehaviourClassifier(dim=4000, passes=50, random_state=0).fit(X[train], y[train])
+        model = BehaviourClassifier(dim=4000, epochs=50, random_state=0).fit(X[train], y[train])
         accuracies.append(model.score(X[test], y[test]))
     assert np.mean(accuracies) >= at_least

@@ -80,7 +80,7 @@ def test_recall_compiles_whole(vsa: str) -> None:
     behaviour = ErrorDriven().fit(space(256, vsa), random_pairs(12))
     assert same(compiled(behaviour)(queries()), behaviour(queries()))
     conditions = behaviour.space.encode(behaviour.space.cells(random_pairs(12).sensors))
-    assert same(compiled(behaviour.ask)(conditions), behaviour.ask(conditions))
+    assert same(compiled(behaviour.query)(conditions), behaviour.query(conditions))
 
 
 @pytest.mark.parametrize("number", [0, 1])
@@ -180,7 +180,7 @@ def test_a_classifier_in_onnxruntime(tmp_path: Path) -> None:
     X = rng.normal(size=(300, 3))  # noqa: N806
     X[::11, 1] = np.nan
     y = np.array(["stop", "left", "right"])[(X[:, 0] > 0).astype(int) + (X[:, 2] > 0.5)]
-    model = BehaviourClassifier(dim=500, bins=64, passes=20, random_state=0).fit(X, y)
+    model = BehaviourClassifier(dim=500, bins=64, epochs=20, random_state=0).fit(X, y)
     path = to_onnx(model.behaviour_, tmp_path / "classes.onnx")
     commands = answers(path, X)[0][:, 0].numpy().astype(int)
     np.testing.assert_array_equal(model.classes_[commands], model.predict(X))
@@ -199,7 +199,7 @@ def test_what_else_can_be_written(tmp_path: Path) -> None:
         "HRR": OneShot().fit(space(256, "HRR", protection="fixed_shift"), shown),
         "BSC": OneShot().fit(space(256, "BSC", protection="none"), shown),
         "MAP-B": ErrorDriven().fit(space(256, "MAP-B"), shown),
-        "gradient": Gradient(passes=5).fit(space(256), shown),
+        "gradient": Gradient(epochs=5).fit(space(256), shown),
         "policy": policies()[0],
     }
     for name, behaviour in modules.items():
@@ -227,7 +227,7 @@ def test_the_file_names_sensors_and_actuators_and_replaces_another(tmp_path: Pat
 
 def test_complex_codes_are_refused(tmp_path: Path) -> None:
     behaviour = OneShot().fit(space(64, "FHRR"), random_pairs(3))
-    with pytest.raises(ValueError, match=r"ONNX knows no complex numbers, so that FHRR\(dim=64"):
+    with pytest.raises(ValueError, match=r"ONNX has no complex numbers, so that FHRR\(dim=64"):
         to_onnx(behaviour, tmp_path / "x")
     assert list(tmp_path.iterdir()) == []
 

@@ -7,7 +7,7 @@ import torch
 from robots import correct, random_pairs, same_bits, space
 
 from behaviours import Demonstrations, Gradient, Space
-from behaviours.learning import gradient as module
+from behaviours.learning import descent as module
 from behaviours.learning.samples import Samples
 
 SPREAD = {"name": "self_shift", "width": "sum"}
@@ -18,7 +18,7 @@ SPREAD = {"name": "self_shift", "width": "sum"}
 @pytest.mark.parametrize("sparse", [False, True])
 def test_every_loss_learns_what_one_superposition_cannot(loss: Any, sparse: bool) -> None:
     shown = random_pairs(300)
-    behaviour = Gradient(loss, passes=60, batch=32, learning_rate=0.1, sparse=sparse).fit(
+    behaviour = Gradient(loss, epochs=60, batch_size=32, learning_rate=0.1, sparse=sparse).fit(
         space(2000, protection=SPREAD), shown
     )
     assert correct(behaviour, shown).mean() > 0.98
@@ -30,9 +30,9 @@ def test_one_step_follows_the_gradient_of_the_loss(sparse: bool) -> None:
     samples = Samples.of(made, shown)
     assert isinstance(samples.conditions, torch.Tensor)
     items = made.items(samples.results)
-    training = module._Training(Gradient(sparse=sparse), made.vsa, samples, items)
+    descent = module.Descent(Gradient(sparse=sparse), made.vsa, samples, items)
     rows = torch.arange(20)
-    training.loss(rows).backward()
+    descent.loss(rows).backward()
     # Where all scores are 0 every result, and silence, has the same share.
     shares = torch.full((20, len(items)), 1 / (len(items) + 1)) - torch.nn.functional.one_hot(
         samples.result, len(items)
@@ -41,15 +41,15 @@ def test_one_step_follows_the_gradient_of_the_loss(sparse: bool) -> None:
     slope = ((samples.conditions.float().T @ shares) * (items.float() / lengths[:, None]).T).sum(1) / 20
     root = module._ROOT
     expected = torch.stack([2 * root * slope, -2 * root * slope]) if sparse else slope
-    assert training.parameters.grad is not None
-    torch.testing.assert_close(training.parameters.grad, expected, atol=1e-6, rtol=1e-4)
+    assert descent.parameters.grad is not None
+    torch.testing.assert_close(descent.parameters.grad, expected, atol=1e-6, rtol=1e-4)
 
 
 @pytest.mark.parametrize("vsa", ["MAP-C", "HRR", "FHRR"])
 @pytest.mark.parametrize("output", ["bipolar", "int8"])
 def test_rounded_programs_still_recall(output: Any, vsa: str) -> None:
     shown = random_pairs(60)
-    behaviour = Gradient(output=output, passes=80).fit(space(4000, vsa, protection=SPREAD), shown)
+    behaviour = Gradient(output=output, epochs=80).fit(space(4000, vsa, protection=SPREAD), shown)
     program = behaviour.program
     values = (torch.view_as_real(program) if program.is_complex() else program).unique()
     if output == "bipolar":
@@ -72,7 +72,7 @@ def one_sensor_decides() -> tuple[Space, Demonstrations]:
 
 def test_a_program_of_fractions_is_clipped_to_the_nearest_codes() -> None:
     shown = random_pairs(60)
-    behaviour = Gradient(passes=30).fit(space(2000, protection=SPREAD), shown)
+    behaviour = Gradient(epochs=30).fit(space(2000, protection=SPREAD), shown)
     assert behaviour.program.abs().median() < 1
     clipped = behaviour.clipped()
     assert clipped.program.dtype == torch.int8
@@ -93,21 +93,21 @@ def test_sparse_programs_are_sparser() -> None:
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 def test_held_back_conditions_stop_the_training() -> None:
     made, shown = one_sensor_decides()
-    rule = Gradient(held_back=0.2, patience=3, passes=80)
+    rule = Gradient(validation_fraction=0.2, patience=3, epochs=80)
     behaviour = rule.fit(made, shown)
-    assert 3 < behaviour.report.passes < 80
+    assert 3 < behaviour.report.epochs < 80
     assert behaviour.report.wrong < 0.05 * len(shown)
     one = Demonstrations([[1.0, 1, 1]], [[0.0, 0]])
-    with pytest.raises(ValueError, match=r"held_back=0.2 of 1 conditions leaves none to hold back"):
+    with pytest.raises(ValueError, match=r"validation_fraction=0.2 of 1 conditions leaves none to validate with"):
         rule.fit(space(64), one)
-    with pytest.raises(ValueError, match=r"held_back=0.9 of 1 conditions leaves none to train on"):
-        Gradient(held_back=0.9).fit(space(64), one)
+    with pytest.raises(ValueError, match=r"validation_fraction=0.9 of 1 conditions leaves none to train on"):
+        Gradient(validation_fraction=0.9).fit(space(64), one)
 
 
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 def test_the_seed_decides() -> None:
     shown, made = random_pairs(50), space(300)
-    first, again, other = (Gradient(batch=16, passes=5, seed=s).fit(made, shown).program for s in (0, 0, 1))
+    first, again, other = (Gradient(batch_size=16, epochs=5, seed=s).fit(made, shown).program for s in (0, 0, 1))
     assert same_bits(first, again)
     assert not torch.equal(first, other)
 

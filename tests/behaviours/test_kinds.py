@@ -110,10 +110,10 @@ WRONG: dict[str, Any] = {
     r"'heading' reads inf in row 0; it is an angle: any finite number, of which -180 and 180 deg": [
         [1, 0, 0, math.inf]
     ],
-    r"'distance' reads 5 in row 0; its range is \[0, 4\] m .*beyond='clip'": [[5, 0, 0, 0]],
+    r"'distance' reads 5 in row 0; its range is \[0, 4\] m .*out_of_range='clip'": [[5, 0, 0, 0]],
     r"'bumper' reads the text 'yes' in row 0; it is binary: 0 or 1, False or True": [[1, "yes", "low", 0]],
     r"'distance' reads the text '1' in row 0; .* numbers and text are lists": np.array([["1", "0", "low", "0"]]),
-    r"must be real numbers \(NaN where there is none\); got None in row 0": [[1, 0, None, 0]],
+    r"must be real numbers \(NaN for 'not observed'\); got None in row 0": [[1, 0, None, 0]],
     r"their order differs": pd.DataFrame([[1, "low", 0, 0]], columns=["distance", "gear", "bumper", "heading"]),
 }
 
@@ -146,19 +146,19 @@ SENSELESS: list[tuple[str, dict[str, Any]]] = [
     ("'x' needs a finite range with low < high", {}),
     ("'x' needs a finite range with low < high", {"kind": "angle"}),
     ("'x' needs a finite range with low < high", {"kind": "angle", "low": 1, "high": 1}),
-    ("'x': only real sensors have a nearest bound, beyond='clip'", {"kind": "binary", "beyond": "clip"}),
+    ("'x': only real sensors have a nearest bound, out_of_range='clip'", {"kind": "binary", "out_of_range": "clip"}),
     ("'x': only a categorical sensor has values; this one is 'real'", {"low": 0, "high": 1, "values": (0, 1)}),
     ("'x': only a categorical sensor has values; this one is 'binary'", {"kind": "binary", "values": (0, 1)}),
-    ("'x' is binary, and has no range of its own; leave out high=2", {"kind": "binary", "low": 0, "high": 2}),
-    ("'x' is categorical, and has no range of its own; leave out low=None", {"values": ["a", "b"], "low": None}),
+    ("'x' is binary, and its values define its range; leave out high=2", {"kind": "binary", "low": 0, "high": 2}),
+    ("'x' is categorical, and its values define its range; leave out low=None", {"values": ["a", "b"], "low": None}),
     ("'x' is categorical and needs at least two values; got []", {"values": ()}),
     ("'x' is categorical and needs at least two values; got ['a']", {"values": ["a"]}),
     ("'x': values are a sequence such as ('low', 'high'); got 'ab'", {"values": "ab"}),
     ("'x': values are a sequence such as ('low', 'high'); got 3", {"values": 3}),
     ("'x': values are a sequence such as ('low', 'high'); got tensor(3)", {"values": torch.tensor(3)}),
-    ("'x': values are all text, or all real numbers; got ['a', 1]", {"values": ("a", 1)}),
-    ("'x': values are all text, or all real numbers; got [True, False]", {"values": (True, False)}),
-    ("'x': values are all text, or all real numbers; got [None, 1]", {"values": (None, 1)}),
+    ("'x': values are all strings, or all real numbers; got ['a', 1]", {"values": ("a", 1)}),
+    ("'x': values are all strings, or all real numbers; got [True, False]", {"values": (True, False)}),
+    ("'x': values are all strings, or all real numbers; got [None, 1]", {"values": (None, 1)}),
     ("'x': values must be finite and differ from each other; got ['a', 'b', 'a']", {"values": ("a", "b", "a")}),
     ("'x': values must be finite and differ from each other; got [1, 1.0]", {"values": (1, 1.0)}),
     ("'x': values must be finite and differ from each other; got [0.0, -0.0]", {"values": (0.0, -0.0)}),
@@ -190,8 +190,8 @@ def test_a_schema_of_all_kinds_survives_json() -> None:
 
 def test_only_what_differs_from_the_default_is_written() -> None:
     real, binary, gear, angle = ROBOT.to_dict()["sensors"]
-    assert list(real) == ["name", "low", "high", "unit", "beyond"]
-    assert binary == {"name": "bumper", "low": 0, "high": 1, "unit": "", "beyond": "error", "kind": "binary"}
+    assert list(real) == ["name", "low", "high", "unit", "out_of_range"]
+    assert binary == {"name": "bumper", "low": 0, "high": 1, "unit": "", "out_of_range": "error", "kind": "binary"}
     assert (gear["low"], gear["high"], gear["kind"], gear["values"]) == (0, 2, "categorical", GEAR.values)
     assert "values" not in angle
 
@@ -204,7 +204,7 @@ def test_demonstrations_read_text_with_a_schema() -> None:
     shown.check(ROBOT)
     with pytest.raises(ValueError, match="'distance' reads 5 in row 1"):
         Demonstrations(frame, [[1.0], [1.0]], schema=ROBOT)
-    with pytest.raises(ValueError, match="'wheel' is told 2"):
+    with pytest.raises(ValueError, match="'wheel' has the command 2"):
         Demonstrations(frame[:1], [[2.0]], schema=ROBOT)
     with pytest.raises(ValueError, match=r"sensors must be real numbers; got the text 'high' in row 0 \(with schema="):
         Demonstrations(frame[:1], [[1.0]])

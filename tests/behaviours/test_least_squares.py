@@ -57,5 +57,5 @@ def test_contradictions_are_answered_by_their_shares() -> None:
 
 def test_architectures_without_a_closed_form_are_refused() -> None:
     for name in ("HRR", "FHRR"):
-        with pytest.raises(ValueError, match=f"element by element, which {name} lacks"):
+        with pytest.raises(ValueError, match=f"element-wise binding of real numbers, which {name} lacks"):
             LeastSquares().fit(space(64, name), random_pairs(3))

@@ -152,19 +152,21 @@ def test_real_and_binary_robots_have_the_codebooks_that_they_had() -> None:
 
 EACH = [Level(VSA, 16), Lookup(VSA, 2), Lookup(VSA, 3), Circular(VSA, 16)]
 WRONG: dict[str, Encoder] = {
-    r"sensor 'gear' has 3 values, and its value encoder Level 16 bins; .* Lookup\(vsa, bins=3\)": Sum(
+    r"sensor 'gear' has 3 values, but its value encoder Level has 16 bins; .* Lookup\(vsa, bins=3\)": Sum(
         Level(VSA, 16), 4
     ),
-    r"sensor 'gear' has 3 values, and its value encoder Lookup 4 bins": Product([*EACH[:2], Lookup(VSA, 4), EACH[3]]),
-    r"'gear' has 3 values, and its value encoder Lookup 2 bins": History(
+    r"sensor 'gear' has 3 values, but its value encoder Lookup has 4 bins": Product(
+        [*EACH[:2], Lookup(VSA, 4), EACH[3]]
+    ),
+    r"'gear' has 3 values, but its value encoder Lookup has 2 bins": History(
         Sum([*EACH[:2], Lookup(VSA, 2), EACH[3]]), [1]
     ),
-    r"sensor 'bumper': Sum has one code for 0 and 1; .* Lookup\(vsa, bins=2\)": Sum([EACH[0], EACH[3], *EACH[2:]]),
-    r"sensor 'bumper': Sum has one code for 0 and 1": Sum([EACH[0], Lookup(VSA, 1), *EACH[2:]]),
-    r"sensor 'gear': ThresholdFeatures has one code for 'high' and 'reverse'; .* the kind 3": ThresholdFeatures(
+    r"sensor 'bumper': Sum has the same code for 0 and 1; .* Lookup\(vsa, bins=2\)": Sum([EACH[0], EACH[3], *EACH[2:]]),
+    r"sensor 'bumper': Sum has the same code for 0 and 1": Sum([EACH[0], Lookup(VSA, 1), *EACH[2:]]),
+    r"sensor 'gear': ThresholdFeatures has the same code for 'high' and 'reverse'; .* the kind 3": ThresholdFeatures(
         VSA, 4, 16, kinds=["real", 2, 2, "angle"]
     ),
-    r"sensor 'bumper': History has one code for 0 and 1": History(
+    r"sensor 'bumper': History has the same code for 0 and 1": History(
         ThresholdFeatures(VSA, 4, 16, kinds=["real", "angle", 3, "angle"]), [2], hold=True
     ),
 }

@@ -4,7 +4,8 @@
 """
 
 import pytest
-from mutants import DAMAGES, verdicts
+from file_damage import DAMAGES
+from mutants import verdicts
 
 BLOCK = 500
 

@@ -29,8 +29,8 @@ PIECEWISE: list[Rule] = [
     OneShot("similarity", clip_each_step=True),
     ErrorDriven(),
     ErrorDriven(average=True),
-    Gradient(passes=20),
-    Gradient(passes=20, sparse=True),
+    Gradient(epochs=20),
+    Gradient(epochs=20, sparse=True),
 ]
 in_pieces = pytest.mark.parametrize("rule", PIECEWISE, ids=str)
 
@@ -135,16 +135,16 @@ def test_reports_and_known_conditions_add_up(rule: Rule) -> None:
         sums = [made.encode(made.cells(piece.sensors)).unique(dim=0).int().sum(0) for piece in pieces]
         assert behaviour.known.tolist() == sum(sums, torch.zeros(4000, dtype=torch.int32)).tolist()
         assert report.updates > 0
-        assert report.passes >= 3
+        assert report.epochs >= 3
     counted = report.new + report.re_added + report.truly_known + report.falsely_known + report.presumed_known
     assert counted == report.samples
 
 
 def test_a_report_of_two_pieces() -> None:
-    a = LearningReport("one_shot", 5, 4, 1, passes=2, updates=7, wrong=3)
-    b = LearningReport("gradient", 3, 1, 2, contradicting=1, passes=9, updates=1, wrong=2)
-    both = LearningReport("gradient", 8, 5, 3, contradicting=1, passes=11, updates=8, wrong=2)
-    assert a.then(b) == both
+    a = LearningReport("one_shot", 5, 4, 1, epochs=2, updates=7, wrong=3)
+    b = LearningReport("gradient", 3, 1, 2, contradicting=1, epochs=9, updates=1, wrong=2)
+    both = LearningReport("gradient", 8, 5, 3, contradicting=1, epochs=11, updates=8, wrong=2)
+    assert a.merged(b) == both
 
 
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
@@ -167,14 +167,14 @@ def test_what_is_in_order_is_left_alone() -> None:
     behaviour = ErrorDriven().fit(space(512), shown)
     again = ErrorDriven().partial_fit(behaviour, shown)
     assert same_bits(again.program, behaviour.program)
-    assert (again.report.updates, again.report.passes) == (behaviour.report.updates, behaviour.report.passes + 1)
+    assert (again.report.updates, again.report.epochs) == (behaviour.report.updates, behaviour.report.epochs + 1)
 
 
 @pytest.mark.parametrize("sparse", [False, True])
 def test_a_descent_starts_where_the_program_is(sparse: bool) -> None:
     shown = random_pairs(30)
     behaviour = Gradient().fit(space(512), shown)
-    slowly = Gradient(learning_rate=1e-9, passes=1, sparse=sparse).partial_fit(behaviour, shown)
+    slowly = Gradient(learning_rate=1e-9, epochs=1, sparse=sparse).partial_fit(behaviour, shown)
     torch.testing.assert_close(slowly.program, behaviour.program, atol=1e-5, rtol=1e-5)
 
 
@@ -182,7 +182,9 @@ def test_a_clipped_behaviour_goes_on_clipped_or_raw() -> None:
     first, then = cut(random_pairs(12), [6])
     made = space(512)
     raw = OneShot().fit(made, first)
-    with pytest.raises(ValueError, match=r"programs of torch.int8.*torch.int32, so go on from behaviour.clipped\(\)"):
+    with pytest.raises(
+        ValueError, match=r"programs of torch.int8.*torch.int32, so continue from behaviour.clipped\(\)"
+    ):
         OneShot("similarity", clip_each_step=True).partial_fit(raw, then)
     clipped = OneShot("similarity", clip_each_step=True).partial_fit(raw.clipped(), then)
     assert clipped.program.dtype == torch.int8
@@ -194,8 +196,8 @@ def test_rules_that_cannot_say_why() -> None:
     shown = random_pairs(5)
     behaviour = OneShot().fit(space(64), shown)
     for rule, words in (
-        (LeastSquares(), "inverse covariance"),
-        (OneShot(), "does not remember which conditions it holds.*known='similarity'"),
+        (LeastSquares(), "covariance of all earlier pairs"),
+        (OneShot(), "does not remember which conditions it holds.*novelty='similarity'"),
         (Gradient(output="int8"), "rounded to 'int8'.*output='float'"),
     ):
         with pytest.raises(ValueError, match=words):
@@ -205,7 +207,7 @@ def test_rules_that_cannot_say_why() -> None:
 @pytest.mark.parametrize("name", RULES)
 def test_a_rule_goes_on_or_says_that_it_cannot(name: str) -> None:
     ready = [rule for rule in PIECEWISE if rule.name == name]
-    assert RULES[name].incremental == bool(ready)
+    assert RULES[name].supports_partial_fit == bool(ready)
 
 
 class Whole(OneShot):
@@ -217,7 +219,7 @@ class Whole(OneShot):
 
 def test_rules_need_not_go_on() -> None:
     shown = random_pairs(5)
-    with pytest.raises(ValueError, match="'whole' cannot go on from a behaviour"):
+    with pytest.raises(ValueError, match="'whole' cannot continue from a behaviour"):
         Whole().partial_fit(OneShot().fit(space(64), shown), shown)
 
 
@@ -231,6 +233,6 @@ def test_a_bank_begins_and_goes_on() -> None:
     assert bank.names == ["seek"]
     assert same_bits(bank["seek"].program, rule.fit(bank.space, shown).program)
     before = bank["seek"]
-    with pytest.raises(ValueError, match="inverse covariance"):
+    with pytest.raises(ValueError, match="covariance of all earlier pairs"):
         bank.partial_fit("seek", then, LeastSquares())
     assert bank["seek"] is before

@@ -84,8 +84,8 @@ def test_chunks_change_no_bit(make: Make) -> None:
 @policies
 def test_many_rows_are_asked_some_at_a_time(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     made, asked = make(bank(dim=4000)), []
-    ask = made.ask
-    monkeypatch.setattr(made, "ask", lambda conditions: asked.append(len(conditions)) or ask(conditions))
+    query = made.query
+    monkeypatch.setattr(made, "query", lambda conditions: asked.append(len(conditions)) or query(conditions))
     readings = random_pairs(1500, seed=2).sensors
     whole = parts(made(readings))
     assert sum(asked) == 1500

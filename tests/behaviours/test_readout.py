@@ -47,7 +47,9 @@ WRITES: dict[str, Callable[[torch.Tensor], object]] = {
 }
 
 
-@pytest.mark.parametrize("part", ["program", "known", "space.results.codes", "space.results.roles", "memory.levels"])
+@pytest.mark.parametrize(
+    "part", ["program", "known", "space.result_encoder.codes", "space.result_encoder.roles", "memory.levels"]
+)
 @pytest.mark.parametrize("write", WRITES)
 def test_answers_follow_what_is_written_by_whatever_way(write: str, part: str) -> None:
     behaviour = OneShot().fit(space(200), random_pairs(4))
@@ -57,7 +59,7 @@ def test_answers_follow_what_is_written_by_whatever_way(write: str, part: str) -
     WRITES[write](tensor)
     if part == "memory.levels":
         tensor.add_(2)  # levels 0 to 2 turned round
-    behaviour.space.results.derive()  # what a codebook's owner does after writing into it
+    behaviour.space.result_encoder.derive()  # what a codebook's owner does after writing into it
     fresh = Behaviour(behaviour.space, behaviour.program, behaviour.known, behaviour.results, behaviour.report)
     assert same(behaviour(READINGS), fresh(READINGS))
     assert not same(behaviour(READINGS), before)
@@ -98,7 +100,7 @@ def test_conditions_in_a_wider_type_are_asked_the_plain_way() -> None:
     conditions = made.encode(made.cells(READINGS[:20]))
     assert isinstance(made.vsa, MAP)
     assert conditions.dtype == torch.int32
-    for row, answer in enumerate(zip(*behaviour.ask(conditions)[:4], strict=True)):
+    for row, answer in enumerate(zip(*behaviour.query(conditions)[:4], strict=True)):
         expected = plain.query(behaviour, READINGS[row])
         assert answer[0].tolist() == expected.commands
         for got, wanted in zip(answer[1:], expected[1:], strict=True):

@@ -29,15 +29,15 @@ OPTIONS: list[Rule] = [
     ErrorDriven(average=True),
     ErrorDriven(contradictions="first"),
     LeastSquares(contradictions="majority"),
-    Gradient(passes=15, sparse=True),
-    Gradient(passes=15, output="int8"),
-    Gradient("hinge", passes=15),
+    Gradient(epochs=15, sparse=True),
+    Gradient(epochs=15, output="int8"),
+    Gradient("hinge", epochs=15),
 ]
 
 
 def quick(name: str) -> Rule:
     """A rule by its name, with options by which it does not take long."""
-    return Gradient(passes=15) if name == "gradient" else RULES.find(name)()
+    return Gradient(epochs=15) if name == "gradient" else RULES.find(name)()
 
 
 @pytest.mark.parametrize("vsa", ARCHITECTURES)
@@ -92,7 +92,7 @@ def test_folded_recall_is_recall_step_by_step(rule: str, vsa: str, protection: s
             assert_close(getattr(recall, field)[row].item(), getattr(expected, field), atol=1e-5, rtol=1e-5)
 
 
-@pytest.mark.parametrize("rule", [rule for rule in RULES if RULES[rule].counts])
+@pytest.mark.parametrize("rule", [rule for rule in RULES if RULES[rule].integer_programs])
 @pytest.mark.parametrize(
     "vsa", [name for name in ARCHITECTURES if torchvsa.architecture(name, 8).integer or "MAP" in name]
 )
@@ -112,7 +112,7 @@ def test_float_and_integer_codes_learn_the_same_program(rule: str) -> None:
 @rules
 def test_a_row_without_any_observed_sensor_is_refused(rule: str) -> None:
     shown = Demonstrations([[1.0, 2, 3], [math.nan] * 3], [[0.0, 0], [1, 1]])
-    with pytest.raises(ValueError, match="row 1 of the demonstration has no observed sensor"):
+    with pytest.raises(ValueError, match="row 1 of the demonstrations has no observed sensor"):
         RULES[rule]().fit(space(64), shown)
 
 
@@ -120,7 +120,8 @@ def test_a_row_without_any_observed_sensor_is_refused(rule: str) -> None:
 def test_values_out_of_range_are_refused(rule: str) -> None:
     with pytest.raises(ValueError, match=r"sensor 'front' reads 21 in row 1; its range is \[0, 20\]"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0, 0], [0, 0, 21]], [[0.0, 0], [0, 0]]))
-    with pytest.raises(ValueError, match=r"actuator 'right_motor' is told -1.5 in row 0; its range is \[-1, 1\]"):
+    message = r"actuator 'right_motor' has the command -1.5 in row 0; its range is \[-1, 1\]"
+    with pytest.raises(ValueError, match=message):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0, 0]], [[0.0, -1.5]]))
     with pytest.raises(ValueError, match=r"left, right, front.*got shape \(1, 2\)"):
         RULES[rule]().fit(space(64), Demonstrations([[0.0, 0]], [[0.0, 0]]))

@@ -17,8 +17,10 @@ from torchvsa import MAP, ShapeError
 from torchvsa.encoders import Lookup, Sum
 
 
-def schema(low: float = 0, high: float = 4, levels: int = 3, beyond: Literal["error", "clip"] = "error") -> Schema:
-    return Schema([Sensor("eye", low, high, "m", beyond)], [Actuator("wheel", low, high, "m/s", levels)])
+def schema(
+    low: float = 0, high: float = 4, levels: int = 3, out_of_range: Literal["error", "clip"] = "error"
+) -> Schema:
+    return Schema([Sensor("eye", low, high, "m", out_of_range)], [Actuator("wheel", low, high, "m/s", levels)])
 
 
 def bins_of(made: Schema, readings: Any, bins: int) -> torch.Tensor:
@@ -66,27 +68,30 @@ def test_a_command_takes_the_nearest_level(levels: int, low: int, span: int, at:
 
 
 def test_beyond_the_range_clips_where_declared() -> None:
-    made = schema(beyond="clip")
+    made = schema(out_of_range="clip")
     assert made.check_readings([[-7.0], [9.0], [2.5]]).flatten().tolist() == [0.0, 4.0, 2.5]
     assert bins_of(made, [[-7.0], [9.0]], 4).flatten().tolist() == [0, 3]
     assert made.check_readings([[math.nan]]).isnan().all()
 
 
 def test_readings_out_of_range_name_sensor_range_and_row() -> None:
-    with pytest.raises(ValueError, match=r"sensor 'eye' reads 4.5 in row 1; its range is \[0, 4\] m.*beyond='clip'"):
+    with pytest.raises(
+        ValueError, match=r"sensor 'eye' reads 4.5 in row 1; its range is \[0, 4\] m.*out_of_range='clip'"
+    ):
         bins_of(schema(), [[1.0], [4.5]], 4)
 
 
-@pytest.mark.parametrize("beyond", ["error", "clip"])
+@pytest.mark.parametrize("out_of_range", ["error", "clip"])
 @pytest.mark.parametrize("value", [math.inf, -math.inf])
-def test_infinite_readings_are_never_accepted(beyond: Literal["error", "clip"], value: float) -> None:
+def test_infinite_readings_are_never_accepted(out_of_range: Literal["error", "clip"], value: float) -> None:
     with pytest.raises(ValueError, match=rf"sensor 'eye' reads {value} in row 2; its range is \[0, 4\] m"):
-        bins_of(schema(beyond=beyond), [[1.0], [math.nan], [value]], 4)
+        bins_of(schema(out_of_range=out_of_range), [[1.0], [math.nan], [value]], 4)
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -0.1, 4.1])
 def test_commands_out_of_range_name_actuator_range_and_row(value: float) -> None:
-    with pytest.raises(ValueError, match=rf"actuator 'wheel' is told {value:g} in row 1; its range is \[0, 4\] m/s"):
+    message = rf"actuator 'wheel' has the command {value:g} in row 1; its range is \[0, 4\] m/s"
+    with pytest.raises(ValueError, match=message):
         schema().command_levels([[1.0], [value]])
 
 
@@ -108,9 +113,9 @@ def test_ranges_must_be_ranges(part: type[Sensor | Actuator], low: float, high: 
 def test_parts_that_make_no_sense() -> None:
     with pytest.raises(ValueError, match="every sensor needs a name"):
         Sensor("", 0, 1)
-    with pytest.raises(ValueError, match="beyond is 'error' or 'clip'; got 'wrap'"):
-        Sensor("x", 0, 1, beyond=cast(Literal["clip"], "wrap"))
-    with pytest.raises(ValueError, match="'x' needs at least 2 levels; got 1"):
+    with pytest.raises(ValueError, match="out_of_range is 'error' or 'clip'; got 'wrap'"):
+        Sensor("x", 0, 1, out_of_range=cast(Literal["clip"], "wrap"))
+    with pytest.raises(ValueError, match="'x': levels is a whole number from 2 to 2147483648; got 1"):
         Actuator("x", 0, 1, levels=1)
     with pytest.raises(ValueError, match="at least one sensor"):
         Schema([], [Actuator("x", 0, 1)])
@@ -158,7 +163,7 @@ def test_bounds_of_numpy_and_torch_are_kept_as_plain_numbers() -> None:
 
 @pytest.mark.parametrize("levels", [2.5, 2.0, True, np.bool_(True), "3", None, 2**31 + 1, 10**30, math.nan])
 def test_levels_are_a_whole_number(levels: Any) -> None:
-    with pytest.raises(ValueError, match=r"'x' needs at least 2 levels; got .*, expected a whole number from 2 to 2"):
+    with pytest.raises(ValueError, match=r"actuator 'x': levels is a whole number from 2 to 2147483648; got"):
         Actuator("x", 0, 1, levels=levels)
 
 

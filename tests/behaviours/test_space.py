@@ -30,9 +30,8 @@ def test_the_seed_decides_every_codebook(vsa: str) -> None:
 def test_no_two_codebooks_are_alike() -> None:
     made = space(4000)
     assert isinstance(made.protect, SelfShift)
-    atoms = torch.cat(
-        [made.encoder.roles, made.encoder.codes, made.results.roles, made.results.codes, made.protect.h[None]]
-    ).double()
+    encoder, results = made.encoder, made.result_encoder
+    atoms = torch.cat([encoder.roles, encoder.codes, results.roles, results.codes, made.protect.h[None]]).double()
     cosines = (atoms @ atoms.T / 4000).fill_diagonal_(0)
     assert cosines.abs().max() < 5 / 4000**0.5
 
@@ -80,8 +79,8 @@ WRONG: dict[str, dict[str, Any]] = {
     "the encoder is for 2 sensors; the schema has 3": {"encoder": Sum(Lookup(VSA, 8), 2)},
     "SelfShift works on MAP-C": {"vsa": MAP(32), "protection": SelfShift(VSA)},
     "the codes of commands are for 4 levels; the schema has 3": {"vsa": VSA, "command_codes": Lookup(VSA, 4)},
-    "seed is a whole number": {"seed": 0.5},
-    r"seed is a whole number in \[0, 2\^63\)": {"seed": -1},
+    "seed is a whole number from 0 to 9223372036854775807; got 0.5": {"seed": 0.5},
+    "seed is a whole number from 0 to 9223372036854775807; got -1": {"seed": -1},
 }
 
 

@@ -108,5 +108,5 @@ def test_labels_are_the_rows_of_the_clean_up_memory() -> None:
     labels = behaviour.labels(shown.commands)
     assert torch.equal(behaviour.space.schema.command_values(behaviour.results[labels]), shown.commands)
     few = OneShot().fit(space(64), shown.where(torch.arange(40) < 1))
-    with pytest.raises(ValueError, match=r"row \d+ asks for levels \[\d, \d\], which are none of the 1 stored results"):
+    with pytest.raises(ValueError, match=r"row \d+ has the levels \[\d, \d\], which are none of the 1 stored results"):
         few.labels(shown.commands)

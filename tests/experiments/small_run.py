@@ -28,7 +28,7 @@ SETTINGS = (
     "seconds=10",
     "paper_bins=[2]",
     "starts=8",
-    "rule.passes=20",
+    "rule.epochs=20",
 )
 STARTS = range(8)
 

@@ -62,7 +62,7 @@ READINGS = torch.tensor([[5.0, 5.0, 0.5], [1.0, 1.0, 0.5]], dtype=torch.float64)
         (READINGS + 1, "sensor 'light_left' reads 6 in row 0; its range is [0, 5] m"),
         (READINGS * torch.inf, "infinite value in row 0, column 0"),
         (READINGS[:0], "needs at least one row"),
-        (torch.full_like(READINGS, torch.nan), "row 0 of the demonstration has no observed sensor"),
+        (torch.full_like(READINGS, torch.nan), "row 0 of the demonstrations has no observed sensor"),
     ],
 )
 def test_a_file_of_demonstrations_that_does_not_fit(tmp_path: Path, readings: torch.Tensor, words: str) -> None:

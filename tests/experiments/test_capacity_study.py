@@ -144,7 +144,7 @@ TINY = (
     "pairs=[4,30,60]",
     "repeats=2",
     "rows=[literal,OneShot_sum,Gradient]",
-    "learners.Gradient.rule.passes=40",
+    "learners.Gradient.rule.epochs=40",
     "workers=1",
 )
 

@@ -56,7 +56,7 @@ def test_the_default_table_has_the_promised_rows() -> None:
 
 def test_the_paper_preset_is_literal() -> None:
     config = settings("experiment=paper")
-    literal = {"known": "similarity", "sigmas": 4.0, "threshold": None, "clip_each_step": True, "name": "one_shot"}
+    literal = {"novelty": "similarity", "sigmas": 4.0, "threshold": None, "clip_each_step": True, "name": "one_shot"}
     literal["contradictions"] = "first"
     assert config["rule"] == config["paper"]["rule"] == literal
     assert config["protection"] == {"name": "self_shift", "width": "mean"}

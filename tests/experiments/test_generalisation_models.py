@@ -103,7 +103,7 @@ def test_without_torch_hd_its_rows_are_absent_and_a_note_says_so(monkeypatch: py
 def test_fit_times_alternate_fold_by_fold(monkeypatch: pytest.MonkeyPatch) -> None:
     config = settings("fit_times.folds=2", "fit_times.sensors=2", "fit_times.dim=50", "fit_times.adapthd_epochs=1")
     config["fit_times"]["threads"] = 1
-    monkeypatch.setitem(wall.MODELS, "one_hypervector", lambda own, seed: BehaviourClassifier(own["dim"], passes=1))
+    monkeypatch.setitem(wall.MODELS, "one_hypervector", lambda own, seed: BehaviourClassifier(own["dim"], epochs=1))
     threads = torch.get_num_threads()
     with quiet() as progress:
         records = fit_times.run(config, Inline(), progress)

@@ -24,7 +24,7 @@ from experiments.damaged_rivals import Network, Tree
 from experiments.robustness import LEARNERS, Case, Shared, check
 from experiments.robustness_report import answers, survival
 
-SMALL = ("vsa.dim=500", "encoder.bins=8", "encoder.span=2", "one_shot.encoder.bins=8", "mlp_passes=15", "hidden=8")
+SMALL = ("vsa.dim=500", "encoder.bins=8", "encoder.span=2", "one_shot.encoder.bins=8", "mlp_epochs=15", "hidden=8")
 READINGS = np.random.default_rng(5).uniform([0, 0, 0], [sensor.high for sensor in sim.SENSORS], (300, 3))
 READINGS[:150, 0] = sim.SENSORS[0].high  # dark to the left, to the right, to both
 READINGS[80:220, 1] = sim.SENSORS[1].high

@@ -20,7 +20,7 @@ from behaviours import (
     Space,
 )
 from behaviours.learning.samples import Samples
-from behaviours.progress import Progress, between, silent
+from behaviours.progress import Progress, no_progress, subrange
 from torchvsa import ARCHITECTURES, VSA
 from torchvsa._numerics import norms
 from torchvsa.encoders import VALUE_ENCODERS, ValueEncoder
@@ -99,11 +99,11 @@ class Average(Rule):
     """Add each condition bound to the average of the results that were shown with it, each of length 1."""
 
     name = "average"
-    counts = False
+    integer_programs = False
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = silent) -> Behaviour:
+    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """Learn one program from the demonstration."""
-        samples = Samples.of(space, demonstrations, between(progress, 0, 0.5))
+        samples = Samples.of(space, demonstrations, subrange(progress, 0, 0.5))
         items = space.items(samples.results).to(torch.float32)
         items = items / norms(items)[:, None].to(items.dtype)
         conditions = samples.conditions[:].to(items.dtype)
@@ -115,7 +115,7 @@ class Average(Rule):
         most = counts.view(shape).argmax(1)
         report = samples.report(self.name, contradicting=int((most[samples.condition] != samples.result).sum()))
         progress(1.0)
-        return Behaviour(space, program, samples.known(space.vsa), samples.results, report)
+        return Behaviour(space, program, samples.condition_sum(space.vsa), samples.results, report)
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
@@ -146,11 +146,11 @@ class Hysteresis(Policy):
         waited = torch.where(blind | (favourite == speaker), torch.where(blind, waited, 0), waited + 1)
         takes_over = ~blind & ((speaker < 0) | (waited >= self.patience))
         speaker, waited = torch.where(takes_over, favourite, speaker), torch.where(takes_over, 0, waited)
-        return _spoken(answers, speaker.clamp(min=0)).blank(blind), (past, speaker, waited)
+        return _spoken(answers, speaker.clamp(min=0)).mask_unobserved(blind), (past, speaker, waited)
 
-    def ask(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Tensor) -> Recall:
         """The answer at the start of an episode: the most familiar behaviour's."""
-        answers = [part.ask(conditions) for part in self.parts]
+        answers = [part.query(conditions) for part in self.parts]
         return _spoken(answers, torch.stack([answer.familiarity for answer in answers]).argmax(0))
 
 

@@ -5,11 +5,15 @@ import torch
 from robots import random_pairs, same_bits, space
 
 from behaviours import Behaviour, Demonstrations, OneShot
-from behaviours.learning import sums
+from behaviours.learning import pair_accumulator
 
 rules = pytest.mark.parametrize(
     "rule",
-    [OneShot(known, sigmas=3.0, clip_each_step=clip) for known in ("equality", "similarity") for clip in (False, True)],
+    [
+        OneShot(novelty, sigmas=3.0, clip_each_step=clip)
+        for novelty in ("exact", "similarity")
+        for clip in (False, True)
+    ],
 )
 
 
@@ -33,8 +37,8 @@ def test_no_bit_depends_on_where_blocks_end(
     rule: OneShot, distinct: int, block: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = fit(rule)
-    monkeypatch.setattr(sums, "_DISTINCT", distinct)
-    monkeypatch.setattr(sums, "_BLOCK", block)
+    monkeypatch.setattr(pair_accumulator, "_DISTINCT", distinct)
+    monkeypatch.setattr(pair_accumulator, "_BLOCK", block)
     parts = fit(rule)
     assert same_bits(parts.program, whole.program)
     assert same_bits(parts.known, whole.known)
@@ -48,7 +52,7 @@ def test_other_architectures_decide_the_same_wherever_blocks_end(
     rule: OneShot, vsa: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = fit(rule, vsa)
-    monkeypatch.setattr(sums, "_DISTINCT", 5)
+    monkeypatch.setattr(pair_accumulator, "_DISTINCT", 5)
     parts = fit(rule, vsa)
     assert parts.report == whole.report
     torch.testing.assert_close(parts.program, whole.program, atol=1e-4, rtol=1e-4)

@@ -1,4 +1,4 @@
-"""Which encoder suits the sensors of a schema: the default one, and what is plainly wrong with another."""
+"""The default encoder of a schema, and checks that an encoder suits its sensors."""
 
 import torch
 
@@ -9,8 +9,8 @@ from torchvsa.encoders.threshold_features import Kind
 
 
 def default_encoder(schema: Schema, vsa: VSA) -> Encoder:
-    """Threshold features that ask each sensor what suits its kind."""
-    # Every threshold parts 0 from 1: a binary reading needs no question of its own.
+    """Threshold features with the kind of each sensor."""
+    # Every threshold separates 0 from 1, so that binary readings count as real ones.
     kinds: list[Kind] = [
         len(sensor.values) if sensor.kind == "categorical" else "angle" if sensor.kind == "angle" else "real"
         for sensor in schema.sensors
@@ -19,9 +19,9 @@ def default_encoder(schema: Schema, vsa: VSA) -> Encoder:
 
 
 def check_value_bins(schema: Schema, encoder: Encoder) -> None:
-    """Raise `ValueError`, naming sensor and remedy, where a record has bins that a sensor cannot be parted into.
+    """Raise `ValueError`, naming sensor and remedy, if a record has the wrong number of bins for a sensor.
 
-    A categorical sensor has as many bins as values. Two angles or real readings must be told apart in float64.
+    A categorical sensor needs as many bins as values. The bins of angles and real readings must differ in float64.
     """
     present = encoder.present if isinstance(encoder, History) else encoder
     if not isinstance(present, Record):
@@ -31,36 +31,36 @@ def check_value_bins(schema: Schema, encoder: Encoder) -> None:
         bins, count = getattr(value, "bins", None), len(sensor.values)
         if sensor.kind == "categorical" and bins not in (None, count):
             raise ValueError(
-                f"sensor {sensor.name!r} has {count} values, and its value encoder {type(value).__name__} {bins} bins; "
-                f"give it one of its own, such as Lookup(vsa, bins={count}), in a list with one per sensor"
+                f"sensor {sensor.name!r} has {count} values, but its value encoder {type(value).__name__} has {bins} "
+                f"bins; give a list of value encoders, one per sensor, with one such as Lookup(vsa, bins={count}) here"
             )
     if encoder is present and present.discrete:
         schema.check_bins(present.bins)
 
 
-def check_told_apart(schema: Schema, encoder: Encoder) -> None:
-    """Raise `ValueError`, naming sensor and remedy, where an encoder has one code for two values of a sensor.
+def check_distinguishable(schema: Schema, encoder: Encoder) -> None:
+    """Raise `ValueError`, naming sensor and remedy, if an encoder has the same code for two values of a sensor.
 
-    An encoder that waits for tensors of a file is not looked at.
+    An encoder without codebooks is not checked.
     """
     if not encoder.drawn:
         return
-    for place, sensor in enumerate(schema.sensors):
+    for column, sensor in enumerate(schema.sensors):
         count = len(sensor.choices)
         if not count:
             continue
         readings = torch.full((count, len(schema.sensors)), torch.nan, dtype=torch.float64)
-        readings[:, place] = torch.tensor(sensor.choices, dtype=torch.float64)
+        readings[:, column] = torch.tensor(sensor.choices, dtype=torch.float64)
         x = schema.normalise(readings)
         x = x.to(next(encoder.buffers(), x).device)
         cells = encoder.cells(encoder.windows(x, torch.arange(count, device=x.device)))
         seen: dict[tuple[float, ...], int] = {}
-        for later, row in enumerate(map(tuple, cells.tolist())):
+        for index, row in enumerate(map(tuple, cells.tolist())):
             if row in seen:
-                first, second = (repr((sensor.values or sensor.choices)[which]) for which in (seen[row], later))
+                first, second = (repr((sensor.values or sensor.choices)[i]) for i in (seen[row], index))
                 raise ValueError(
-                    f"sensor {sensor.name!r}: {type(encoder).__name__} has one code for {first} and {second}; give "
-                    f"this sensor a value encoder of its own, such as Lookup(vsa, bins={count}), or in "
+                    f"sensor {sensor.name!r}: {type(encoder).__name__} has the same code for {first} and {second}; "
+                    f"give this sensor its own value encoder, such as Lookup(vsa, bins={count}), or in "
                     f"ThresholdFeatures the kind {count}"
                 )
-            seen[row] = later
+            seen[row] = index
