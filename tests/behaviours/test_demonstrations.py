@@ -228,7 +228,7 @@ FIELDS: dict[str, tuple[Callable[[dict[str, torch.Tensor]], Any], Any, str]] = {
     "NaN commands": (lambda t: t["commands"].fill_(math.nan), ABOUT, "commands has nan"),
     "no episodes": (lambda t: t.pop("episodes"), ABOUT, "expected the tensors sensors, commands, episodes"),
     "another tensor": (lambda t: t.update(more=torch.ones(1)), ABOUT, "expected the tensors"),
-    "unknown field": (len, ABOUT | {"robot": 1}, "its description must hold nothing but rows"),
+    "unknown field": (len, ABOUT | {"robot": 1}, "its description must contain only rows"),
     "other rows": (len, {"rows": 4}, "rows is 4"),
     "rows of another type": (len, {"rows": True}, "rows is True"),
     "names of another type": (len, {"rows": 3, "sensor_names": "lr"}, "sensor_names must be a list"),

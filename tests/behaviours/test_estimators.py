@@ -184,7 +184,7 @@ def test_the_wall_following_set(sensors: int) -> None:
         "Slight-Left-Turn": 328,
         "Slight-Right-Turn": 826,
     }
-    with pytest.raises(ValueError, match="24, 4 or 2 sensors; got 3"):
+    with pytest.raises(ValueError, match="sensors is 24, 4 or 2; got 3"):
         load_wall_following(3)
 
 

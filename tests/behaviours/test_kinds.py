@@ -206,7 +206,7 @@ def test_demonstrations_read_text_with_a_schema() -> None:
         Demonstrations(frame, [[1.0], [1.0]], schema=ROBOT)
     with pytest.raises(ValueError, match="'wheel' has the command 2"):
         Demonstrations(frame[:1], [[2.0]], schema=ROBOT)
-    with pytest.raises(ValueError, match=r"sensors must be real numbers; got the text 'high' in row 0 \(with schema="):
+    with pytest.raises(ValueError, match=r"sensors must be real numbers; got the text 'high' in row 0 \(give schema="):
         Demonstrations(frame[:1], [[1.0]])
     series = Demonstrations(pd.Series(["high", "low"], name="gear"), [[1.0], [0]], schema=Schema([GEAR], WHEEL))
     assert (series.sensors.tolist(), series.sensor_names) == ([[1], [0]], ("gear",))

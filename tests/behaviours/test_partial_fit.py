@@ -197,8 +197,8 @@ def test_rules_that_cannot_say_why() -> None:
     behaviour = OneShot().fit(space(64), shown)
     for rule, words in (
         (LeastSquares(), "covariance of all earlier pairs"),
-        (OneShot(), "does not remember which conditions it holds.*novelty='similarity'"),
-        (Gradient(output="int8"), "rounded to 'int8'.*output='float'"),
+        (OneShot(), "needs all earlier conditions.*novelty='similarity'"),
+        (Gradient(output="int8"), "output='int8' rounds.*output='float'"),
     ):
         with pytest.raises(ValueError, match=words):
             rule.partial_fit(behaviour, shown)

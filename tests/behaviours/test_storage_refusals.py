@@ -129,7 +129,7 @@ def test_what_was_changed_without_its_checksum_is_refused(tmp_path: Path) -> Non
     content = bytearray(path.read_bytes())
     content[-1] ^= 1
     path.write_bytes(content)
-    with pytest.raises(ValueError, match=f"{path}: the checksum does not fit"):
+    with pytest.raises(ValueError, match=f"{path}: the checksum is wrong"):
         BehaviourBank.load(path)
 
 
