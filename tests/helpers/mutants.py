@@ -20,8 +20,9 @@ from typing import Any
 import torch
 from file_damage import DAMAGES, FORGED
 from sound_files import originals
+from torch import Tensor
 
-from behaviours import BehaviourBank, Demonstrations
+from behaviours import BehaviourBank, Demonstrations, Sensor
 
 ROOM = 2**28
 """Bytes that loading a mutant may take; the files are of some kilobytes."""
@@ -66,10 +67,7 @@ def _broken(loaded: BehaviourBank | Demonstrations) -> str:
     sensors = len(loaded.space.schema.sensors)
     readings = torch.cat([ASK] * (1 + sensors // 2), 1)[:, :sensors]
     readings = torch.stack(
-        [
-            column.clamp(sensor.low, sensor.high)
-            for column, sensor in zip(readings.T, loaded.space.schema.sensors, strict=True)
-        ],
+        [_valid(column, sensor) for column, sensor in zip(readings.T, loaded.space.schema.sensors, strict=True)],
         1,
     )
     for name in loaded:
@@ -85,6 +83,15 @@ def _broken(loaded: BehaviourBank | Demonstrations) -> str:
         if recall.margin.isnan().any():
             return "a margin that is no number"
     return ""
+
+
+def _valid(column: Tensor, sensor: Sensor) -> Tensor:
+    """Numbers in [0, 1] as readings of a sensor."""
+    if not sensor.choices:
+        return column.clamp(sensor.low, sensor.high)
+    choices = torch.tensor(sensor.choices, dtype=torch.float64)
+    chosen = choices[(column.nan_to_num() * len(choices)).long().clamp(max=len(choices) - 1)]
+    return torch.where(column.isnan(), column, chosen)
 
 
 @contextmanager

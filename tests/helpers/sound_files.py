@@ -42,6 +42,21 @@ def _bank(make: Callable[[VSA], Encoder], vsa: VSA, protection: Protection | Non
     with no_convergence_warnings():  # how well it learns from so few dimensions is not the question
         bank.learn("steer", Demonstrations(readings[:12], commands[:12]), ErrorDriven())
     bank.learn("forward . é", Demonstrations(readings[12:], commands[12:]), OneShot())
+    bank.add("both", bank["steer"] - 2 * bank["forward . é"])
+    return bank
+
+
+def _mixed() -> BehaviourBank:
+    """A robot with sensors of every kind, over the default space."""
+    sensors = [
+        Sensor("switch", kind="binary"),
+        Sensor("gear", kind="categorical", values=("low", "high", "reverse")),
+        Sensor("level", kind="categorical", values=(1.5, -2.0)),
+        Sensor("heading", -180, 180, kind="angle"),
+    ]
+    bank = BehaviourBank(Space(Schema(sensors, [Actuator("turn", -1, 1, levels=3)]), vsa=MAP(32, dtype=torch.int8)))
+    readings = [[0, 0, 1.5, 170.0], [1, 2, -2.0, -90.0], [1, 1, 1.5, 0.0]]
+    bank.learn("steer", Demonstrations(readings, [[-1], [0], [1]]), OneShot())
     return bank
 
 
@@ -59,6 +74,7 @@ def originals() -> list[tuple[str, bytes]]:
         _bank(lambda vsa: History(Sum(Thermometer(vsa, 4), 2), [1]), MAP(32, "I", torch.int8)),
         _bank(lambda vsa: Sum(FractionalPower(vsa), 2), fhrr),
         _bank(lambda vsa: RandomFourier(vsa, 2), floats),
+        _mixed(),
     ]
     shown = Demonstrations([[0.1, math.nan], [0.2, 0.3], [0.5, 0.6]], [[0.0], [1.0], [0.5]], [0, 0, 1])
     files = []
