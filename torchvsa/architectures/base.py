@@ -60,9 +60,8 @@ class VSA(ABC):
         if self.dim < 1:
             raise ValueError(f"{_DIM}; got {dim!r}")
         if not self.allows_dim(self.dim):
-            raise ValueError(
-                f"{type(self).__name__} does not allow dim={self.dim}; {nearest(self.allows_dim, self.dim)}"
-            )
+            allowed = nearest(self.allows_dim, self.dim)
+            raise ValueError(f"{type(self).__name__} does not allow dim={self.dim}; {allowed}")
         self.dtype = dtype
 
     def __repr__(self) -> str:
@@ -293,9 +292,7 @@ class VSA(ABC):
         """Raise `ValueError` unless the elements of `x` have the type and the range of those that `random` draws."""
         self.check(x, what)
         if x.dtype != self.dtype or not self._are_codes(x):
-            raise ValueError(
-                f"{what} must hold codes of {self}; it holds other values, or is of another type ({x.dtype})"
-            )
+            raise ValueError(f"{what} must hold codes of {self}; it holds other values or another type ({x.dtype})")
 
     def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
         """Whether every element has a value that an element of a hypervector can have."""

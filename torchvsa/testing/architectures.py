@@ -6,10 +6,10 @@ import torch
 from torch import Tensor
 from torch.testing import assert_close
 
-from torchvsa._numerics import norms
 from torchvsa.architectures import ARCHITECTURES, VSA, architecture
 from torchvsa.errors import ShapeError
 from torchvsa.testing._laws import check, refuses, require, same, seeded
+from torchvsa.testing._readout import READOUT_LAWS
 
 
 def check_architecture(vsa: VSA) -> None:
@@ -81,29 +81,6 @@ def _bind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
     if vsa.bilinear:
         assert_close(vsa.bind(key, raw), vsa.superpose(vsa.bind(key, xs), weights=weights))
         assert_close(vsa.unbind(key, raw), vsa.superpose(vsa.unbind(key, xs), weights=weights))
-
-
-def _unbind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
-    xs, key, weights = _draw(vsa, 6), _draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
-    raw = vsa.superpose(xs, weights=weights)
-    assert_close(vsa.unbind(raw, key), vsa.superpose(vsa.unbind(xs, key), weights=weights))
-
-
-def _a_readout_unbinds_and_compares(vsa: VSA) -> None:
-    programs, conditions, items = (
-        vsa.superpose(_draw(vsa, 2, 9), -2),
-        vsa.bundle(_draw(vsa, 4, 3, seed=1)),
-        _draw(vsa, 5),
-    )
-    for program in (programs[0], programs):
-        noisy = vsa.unbind(program, conditions if program.dim() == 1 else conditions[:, None])
-        cosines = vsa.similarity(noisy[..., None, :], items).double()
-        readout = vsa.readout(program, items)
-        assert_close(readout(conditions), cosines * norms(noisy)[..., None], rtol=1e-5, atol=1e-5)
-        match, top = readout.match(conditions), cosines.float().topk(2)
-        assert_close(match.index, top.indices[..., 0])
-        assert_close(match.similarity, top.values[..., 0], rtol=1e-5, atol=1e-6)
-        assert_close(match.margin, top.values[..., 0] - top.values[..., 1], rtol=1e-5, atol=1e-6)
 
 
 def _superpose_adds_up(vsa: VSA) -> None:
@@ -227,12 +204,6 @@ def _a_zero_vector_has_a_gradient_without_nan(vsa: VSA) -> None:
     require(gradient[1:].abs().max() > 0)
 
 
-def _unbound_norm_is_the_norm_of_the_unbound(vsa: VSA) -> None:
-    program, keys = vsa.superpose(_draw(vsa, 9)), vsa.bundle(_draw(vsa, 4, 3, seed=1))
-    expected = norms(vsa.unbind(program, keys))
-    assert_close(vsa.unbound_norm(program, keys), expected, rtol=0 if vsa.integer else 1e-6, atol=0)
-
-
 def _a_negative_is_opposite(vsa: VSA) -> None:
     if vsa.negatable:
         a = _draw(vsa, 3)
@@ -282,8 +253,6 @@ _LAWS: tuple[Callable[[VSA], None], ...] = (
     _unbind_undoes_bind,
     _the_identity_binds_to_nothing,
     _bind_is_linear_over_a_raw_accumulator,
-    _unbind_is_linear_over_a_raw_accumulator,
-    _a_readout_unbinds_and_compares,
     _superpose_adds_up,
     _a_bundle_resembles_its_members_only,
     _a_bundle_does_not_depend_on_order,
@@ -298,9 +267,9 @@ _LAWS: tuple[Callable[[VSA], None], ...] = (
     _similarity_is_symmetric_and_bounded,
     _a_zero_vector_is_similar_to_nothing,
     _a_zero_vector_has_a_gradient_without_nan,
-    _unbound_norm_is_the_norm_of_the_unbound,
     _a_negative_is_opposite,
     _angles_add_up_under_binding,
     _a_dim_that_is_not_allowed_is_refused,
     _it_is_made_again_from_its_config,
+    *READOUT_LAWS,
 )
