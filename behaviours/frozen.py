@@ -66,6 +66,14 @@ class FrozenBehaviour(Controller):
             row_bytes=8 * self.space.vsa.dim,
         )
 
+    def __getstate__(self) -> dict[str, Any]:
+        # The fast path is made of functions, which no file or other process takes.
+        return self.__dict__ | {"_tick": None}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        super().__setstate__(state)
+        self._tick = _Tick.of(self)
+
     def _apply(self, fn: Callable[[Tensor], Tensor], recurse: bool = True) -> "FrozenBehaviour":
         commands = self.commands
         super()._apply(fn, recurse)

@@ -2,6 +2,8 @@
 
 import copy
 import math
+import pickle
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -9,7 +11,8 @@ import torch
 from robots import random_pairs, same_bits, space
 from torch.testing import assert_close
 
-from behaviours import ErrorDriven, OneShot, Recall
+from behaviours import Controller, ErrorDriven, OneShot, Recall
+from behaviours.testing._controllers import CONTROLLER_LAWS
 from torchvsa import ARCHITECTURES
 
 READINGS = [*random_pairs(20).sensors.tolist(), [math.nan, 3.3, 19.0], [math.nan] * 3]
@@ -57,6 +60,17 @@ def test_copies_and_other_types_answer_alike() -> None:
     for twin in (copy.deepcopy(frozen), frozen.to("cpu")):
         assert same(twin(READINGS), frozen(READINGS))
         assert same(twin([READINGS[3]]), frozen([READINGS[3]]))
+
+
+@pytest.mark.parametrize("vsa", ["MAP-C", "HRR", "BSC"])
+@pytest.mark.parametrize("law", CONTROLLER_LAWS, ids=lambda law: law.__name__)
+def test_it_keeps_the_laws_of_controllers(law: Callable[[Controller], None], vsa: str) -> None:
+    law(ErrorDriven().fit(space(500, vsa, protection="none"), random_pairs(8)).freeze())
+
+
+def test_it_moves_to_another_process() -> None:
+    frozen = OneShot().fit(space(200), random_pairs(20)).freeze()
+    assert same(pickle.loads(pickle.dumps(frozen))([READINGS[3]]), frozen([READINGS[3]]))
 
 
 @pytest.mark.slow
