@@ -157,7 +157,7 @@ def test_each_sensor_may_have_a_value_encoder_of_its_own(vsa: VSA, kind: type[Re
             | {"values.0.codes": part.codes}
         )
         assert_close(encode(alone), same(alone))
-    with pytest.raises(ValueError, match="a value encoder of its own"):
+    with pytest.raises(ValueError, match="one value encoder per sensor"):
         encode.codes  # noqa: B018
 
 
