@@ -128,7 +128,7 @@ def test_the_closed_form_is_that_of_a_raw_sum() -> None:
         ("dims=[100,100]", "dims names 100 2 times"),
         ("dims=[0]", "dims are whole numbers from 1; got 0"),
         ("pairs=[9000]", "pairs are whole numbers from 1 to 8000; got 9000"),
-        ("accuracy=1.0", "accuracy is a fraction between 0 and 1"),
+        ("accuracy=1.0", "accuracy is a share between 0 and 1"),
         ("learners.Gradient.codes=secret", "there are no codes 'secret'"),
         ("learners.Gradient.rule.name=guess", "no learning rule 'guess'"),
         ("vsa={name: HRR, dtype: float32}", "LeastSquares: the rule least_squares cannot train programs of HRR"),

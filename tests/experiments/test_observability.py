@@ -154,7 +154,7 @@ def test_what_is_not_there_is_named() -> None:
         ({"starts": -1}, "starts=-1: expected 0 or more"),
         ({"heldout": 0}, "heldout=0: expected 1 or more"),
         ({"lags": []}, "lags is empty"),
-        ({"lags": [[2, 1]]}, "growing numbers of steps"),
+        ({"lags": [[2, 1]]}, "increasing whole numbers of steps"),
     ):
         with pytest.raises(ValueError, match=words):
             check(config | change)

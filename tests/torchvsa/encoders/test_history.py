@@ -187,10 +187,10 @@ def test_readings_in_float32_have_windows_of_one_type_live_and_recorded() -> Non
 
 @pytest.mark.parametrize("lags", [[0], [2, 1], [1, 1], [1.5]])
 def test_wrong_lags_are_refused(lags: list[int]) -> None:
-    with pytest.raises(ValueError, match="growing numbers of steps"):
+    with pytest.raises(ValueError, match="increasing whole numbers of steps"):
         History(present(), lags)
 
 
 def test_scattered_episodes_are_refused() -> None:
-    with pytest.raises(ValueError, match="must stand together"):
+    with pytest.raises(ValueError, match="must be next to each other"):
         windows(torch.zeros(3, 1), torch.tensor([0, 1, 0]), [1])
