@@ -83,7 +83,7 @@ def _threshold_features(dim: int, device: str, small: bool) -> Case:
                 assert_close(mine, theirs, rtol=0, atol=0)
 
     return Case(
-        "24 sensors with thresholds, one control tick, frozen",
+        "Algorithm 2, 24 sensors with thresholds, one control tick, frozen",
         f"B=1 d={dim}",
         lambda index: frozen(rows[index]),
         {"not frozen": lambda index: behaviour(rows[index])},
