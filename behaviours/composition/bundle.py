@@ -10,7 +10,7 @@ from behaviours.algebra import stack_programs
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
-from behaviours.recall import Recall
+from behaviours.recall import Recall, familiarity
 
 
 class Bundle(Policy):
@@ -50,10 +50,13 @@ class Bundle(Policy):
 
     def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """The answer to encoded and protected conditions, see `Policy.query`."""
-        scores = self.behaviour.readout()(conditions)
+        whole = self.behaviour
+        readout = whole.readout()
+        match = readout.match(conditions)
         # The score of a result is the weighted sum of its scores for each behaviour.
-        parts = self.behaviour.readout().of(stack_programs([part.program for part in self.parts]))(conditions)
-        weights = torch.tensor(self.weights, dtype=torch.float64, device=scores.device)
-        winner = scores.argmax(-1)[:, None, None].expand(-1, len(weights), 1)
+        parts = readout.of(stack_programs([part.program for part in self.parts]))(conditions)
+        weights = torch.tensor(self.weights, dtype=torch.float64, device=parts.device)
+        winner = match.index[:, None, None].expand(-1, len(weights), 1)
         shares = (weights * parts.gather(-1, winner)[..., 0]).masked_fill(weights == 0, -torch.inf)
-        return self.behaviour.query(conditions)._replace(speaker=shares.argmax(-1))
+        familiar = familiarity(conditions, whole.known)
+        return Recall(whole.memory.commands[match.index], match.similarity, match.margin, familiar, shares.argmax(-1))
