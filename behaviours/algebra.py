@@ -1,16 +1,15 @@
 """Weighted sums of behaviours: their programs and their terms."""
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import reduce
-from numbers import Real
 from typing import Any
 
 import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
+from behaviours.options import as_float
 from behaviours.ordered import distinct_rows
 from behaviours.report import LearningReport
 from torchvsa import VSA
@@ -51,9 +50,7 @@ class Term:
 
 def checked_weight(value: Any) -> float:
     """`value` as an int if it is whole, else as a float. Raises `ValueError` unless it is a finite number."""
-    if isinstance(value, bool) or not isinstance(value, Real) or not math.isfinite(value):
-        raise ValueError(f"the weight of a behaviour is a finite number; got {value!r}")
-    number = float(value)
+    number = as_float("the weight of a behaviour", value)
     return int(number) if number.is_integer() else number
 
 
@@ -84,9 +81,11 @@ def terms_to_dicts(terms: Sequence[Term], results: Int64[Tensor, "k m"]) -> list
     rows = [tuple(row) for row in results.tolist()]
     return [
         {
-            **asdict(replace(term, results=None)),  # type: ignore[arg-type] (a tensor is no plain value)
+            "name": term.name,
+            "weight": term.weight,
             "report": term.report.to_dict(),
             "results": [rows.index(tuple(row)) for row in term.results.tolist()],
+            "fingerprint": term.fingerprint,
         }
         for term in terms
     ]

@@ -13,6 +13,7 @@ from behaviours.algebra import terms_from_dicts, terms_to_dicts
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import Gradient, Rule, require_rule
+from behaviours.memory import check_levels
 from behaviours.progress import Progress, no_progress
 from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
@@ -203,10 +204,9 @@ class BehaviourBank(nn.Module):
             for number, (name, report) in enumerate(entries):
                 with error_context(f"behaviour {name!r}"):
                     program, known, results = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
-                    behaviour = Behaviour(space, program, known, results, report)
-                    if terms[number] is not None:
-                        parsed = terms_from_dicts(terms[number], behaviour.results)
-                        behaviour = Behaviour(space, program, known, results, report, parsed)
+                    check_levels(space.schema, results)
+                    parsed = () if terms[number] is None else terms_from_dicts(terms[number], results)
+                    behaviour = Behaviour(space, program, known, results, report, parsed)
                 bank.add(name, behaviour)
         return bank
 

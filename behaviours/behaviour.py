@@ -13,13 +13,12 @@ from behaviours.algebra import Term, checked_weight, merge_terms, merged_report,
 from behaviours.controller import Controller
 from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
-from behaviours.recall import Recall, answer_conditions
+from behaviours.recall import Recall, answer_cells, answer_conditions
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Sensor
 from behaviours.space import Space
 from behaviours.storage import checksum
 from torchvsa import VSA, Readout, ShapeError
-from torchvsa._blocks import by_blocks
 from torchvsa._numerics import as_bipolar, is_integer
 
 
@@ -114,10 +113,10 @@ class Behaviour(Controller):
         terms = merge_terms([replace(t, weight=weight * t.weight) for part, weight in weighted for t in part.terms])
         if not terms:
             raise ValueError("the behaviours of this sum cancel each other, so that no term is left")
-        parts, weights = [part.over(space) for part, _ in weighted], [weight for _, weight in weighted]
-        program = weighted_sum(space.vsa, weights, [part.program.detach() for part in parts])
-        known = weighted_sum(space.vsa, weights, [part.known for part in parts])
-        return cls(space, program, known, merged_results(terms).to(space.device), merged_report(terms), terms)
+        weights, device = [weight for _, weight in weighted], space.device
+        program = weighted_sum(space.vsa, weights, [part.program.detach().to(device) for part, _ in weighted])
+        known = weighted_sum(space.vsa, weights, [part.known.to(device) for part, _ in weighted])
+        return cls(space, program, known, merged_results(terms).to(device), merged_report(terms), terms)
 
     def __add__(self, other: object) -> "Behaviour":
         return Behaviour.sum([self, other]) if isinstance(other, Behaviour) else NotImplemented
@@ -150,13 +149,7 @@ class Behaviour(Controller):
         return self.space.vsa.readout(self.program, self.memory.current_items())
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        readout = self.readout()
-        # Each block of rows is processed to the end, so that its conditions, in float64, stay in the cache.
-        return by_blocks(
-            lambda rows: answer_conditions(readout, self.known, self.memory.commands, self.space.encode(rows)),
-            cells,
-            row_bytes=8 * self.space.vsa.dim,
-        )
+        return answer_cells(self.space.encode, self.readout(), self.known, self.memory.commands, cells)
 
     def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """The answer to encoded and protected conditions (Algorithm 2, lines 2 to 8)."""

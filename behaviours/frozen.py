@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from behaviours.controller import Controller
-from behaviours.recall import Recall, answer_conditions
+from behaviours.recall import Recall, answer_cells
 from behaviours.space import Space
 from torchvsa import Readout
-from torchvsa._blocks import by_blocks
 from torchvsa._numerics import as_bipolar, in_units, norms, real_parts
 from torchvsa._rows import Row, noise, real, row_encoder
 
@@ -48,7 +47,8 @@ class FrozenBehaviour(Controller):
 
     def forward(self, readings: Any) -> Recall:
         """Commands `[B, m]` for readings `[B, n]`, see `Controller.forward`."""
-        return self._fast_answer(readings) or super().forward(readings)
+        recall = self._fast_answer(readings)
+        return super().forward(readings) if recall is None else recall
 
     def step(self, readings: Any, state: Any) -> tuple[Recall, Any]:
         """The answer to the readings `[B, n]` of the next step, see `Controller.step`."""
@@ -60,11 +60,7 @@ class FrozenBehaviour(Controller):
         return None if self._tick is None or torch.compiler.is_compiling() else self._tick(readings)
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        return by_blocks(
-            lambda rows: answer_conditions(self.readout, self.known, self.commands, self.space.encode(rows)),
-            cells,
-            row_bytes=8 * self.space.vsa.dim,
-        )
+        return answer_cells(self.space.encode, self.readout, self.known, self.commands, cells)
 
     def __getstate__(self) -> dict[str, Any]:
         # The fast path is made of functions, which no file or other process takes.

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from behaviours.ordered import distinct_rows
 from torchvsa import Readout
+from torchvsa._blocks import by_blocks
 from torchvsa._numerics import in_units, inner_products, norms, over_lengths
 
 
@@ -76,6 +77,20 @@ def answer_conditions(
     """
     match = readout.match(conditions)
     return Recall(commands[match.index], match.similarity, match.margin, familiarity(conditions, known))
+
+
+def answer_cells(
+    encode: Callable[[Shaped[Tensor, "batch w"]], Shaped[Tensor, "batch d"]],
+    readout: Readout,
+    known: Shaped[Tensor, "d"],
+    commands: Float64[Tensor, "k m"],
+    cells: Shaped[Tensor, "batch w"],
+) -> Recall:
+    """The answer to cells, which `encode` maps to conditions; see `answer_conditions`."""
+    # Each block of rows is processed to the end, so that its conditions, in float64, stay in the cache.
+    return by_blocks(
+        lambda rows: answer_conditions(readout, known, commands, encode(rows)), cells, row_bytes=8 * len(known)
+    )
 
 
 def familiarity(conditions: Shaped[Tensor, "batch d"], known: Shaped[Tensor, "d"]) -> Float[Tensor, "batch"]:

@@ -157,7 +157,8 @@ class Space(nn.Module):
                 with error_context(name):
                     part.take({key.removeprefix(prefix): t for key, t in codebooks.items() if key.startswith(prefix)})
         result_encoder: Any = parts["result_encoder"]
-        space = cls(schema, parts["encoder"], vsa, parts["protect"], config["seed"], result_encoder.value)  # type: ignore[arg-type]
+        made: Any = parts
+        space = cls(schema, made["encoder"], vsa, made["protect"], config["seed"], result_encoder.value)
         space.result_encoder = result_encoder if result_encoder.drawn else space.result_encoder
         return space
 

@@ -12,7 +12,7 @@ from torch import Tensor
 
 from torchvsa._blocks import by_blocks
 from torchvsa._checks import readable, type_bound
-from torchvsa._kernels.integer_products import integer_products
+from torchvsa._kernels.integer_products import FLOAT_TERMS, integer_products
 
 
 def as_bipolar(x: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:
@@ -165,10 +165,10 @@ def in_units(x: Shaped[Tensor, "*batch d"]) -> tuple[Shaped[Tensor, "*batch d"],
 
 
 def _int8_squares(x: Shaped[Tensor, "rows d"]) -> Shaped[Tensor, "rows"]:
-    # Floats are summed fastest. They are exact below 2^24, which 1,023 squares of int8 cannot reach.
+    # Floats are summed fastest.
     squares = x.to(torch.float32)
     squares *= squares
-    return torch.stack([part.sum(-1).to(torch.float64) for part in squares.split(1023, -1)]).sum(0)
+    return torch.stack([part.sum(-1).to(torch.float64) for part in squares.split(FLOAT_TERMS, -1)]).sum(0)
 
 
 def safe_sqrt(squares: Shaped[Tensor, "*s"]) -> Shaped[Tensor, "*s"]:

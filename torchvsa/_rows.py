@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 
 from torchvsa.architectures import BSC, FHRR, HRR, MAP, VSA
 from torchvsa.encoders import Encoder, Product, SubsetProduct, Sum, ThresholdFeatures
-from torchvsa.encoders.base import Binned
+from torchvsa.encoders.base import ROUNDING, Binned
 from torchvsa.protection import FixedShift, Protection, SelfShift, Unprotected
 
 Array = NDArray[Any]
 Row = Callable[[Array], Array]
-ROUNDED = 1 + 2.0**-50
-"""The allowance for rounding of `torchvsa.encoders.base.binned`."""
 
 
 class Verbs(NamedTuple):
@@ -68,8 +66,8 @@ def noise(vsa: VSA, program: Array) -> Callable[[Array, Array], float]:
     known = verbs(vsa)
     if known is not None and known.noise is not None:
         return known.noise(program)
-    squares = np.abs(program if program.dtype != np.bool_ else 1).astype(np.float64) ** 2
-    weights = np.broadcast_to(squares, vsa.dim).repeat(2 if np.iscomplexobj(program) else 1)
+    sizes = np.abs(program).repeat(2) if np.iscomplexobj(program) else real(program)
+    weights = sizes.astype(np.float64) ** 2
     return lambda _, squares: float(squares @ weights)
 
 
@@ -137,16 +135,21 @@ def _hrr(vsa: VSA) -> Verbs:
 _VERBS: dict[type, Callable[[Any], Verbs]] = {MAP: _map, BSC: _bsc, FHRR: _fhrr, HRR: _hrr}
 
 
+def _binned(bins: Any) -> Row:
+    """`torchvsa.encoders.base.binned` for `bins` per reading, as floats; NaN stays NaN."""
+    scale, last = bins * (1 + ROUNDING), bins - 1
+    return lambda x: np.minimum(np.floor(x * scale), last)
+
+
 def _record(encoder: Any, join: Row) -> Row | None:
     values = list(encoder.values) * (encoder.sensors if encoder.shared else 1)
     if encoder.table is None or any(type(value).cells is not Binned.cells for value in values):
         return None
     table, sensors = encoder.table.numpy(), np.arange(encoder.sensors)
-    bins = np.array([value.bins for value in values], dtype=np.float64)
-    scale, last = bins * ROUNDED, bins - 1
+    binned = _binned(np.array([value.bins for value in values], dtype=np.float64))
 
     def encode(x: Array) -> Array:
-        cells, observed = np.minimum(np.floor(x * scale), last), ~np.isnan(x)
+        cells, observed = binned(x), ~np.isnan(x)
         if observed.all():
             return join(table[sensors, cells.astype(np.int64)])
         return join(table[sensors[observed], cells[observed].astype(np.int64)])
@@ -157,7 +160,7 @@ def _record(encoder: Any, join: Row) -> Row | None:
 def _thresholds(encoder: Any, _: Verbs) -> Row | None:
     if encoder.kinds is not None:
         return None
-    vsa, bins = encoder.vsa, encoder.bins
+    vsa, binned = encoder.vsa, _binned(encoder.bins)
     start, negative = encoder.start_codes.numpy(), vsa.negative(encoder.start_codes).resolve_neg().numpy()
     # int32 compares faster than int64.
     sensor, threshold, above = encoder.sensor.numpy(), encoder.threshold.int().numpy(), encoder.above.numpy()
@@ -165,7 +168,7 @@ def _thresholds(encoder: Any, _: Verbs) -> Row | None:
     edges = encoder.edges.numpy() if hasattr(encoder, "edges") else None
 
     def encode(x: Array) -> Array:
-        found = np.minimum(np.floor(x * (bins * ROUNDED)), bins - 1) if edges is None else (edges <= x[:, None]).sum(1)
+        found = binned(x) if edges is None else (edges <= x[:, None]).sum(1)
         unseen = np.isnan(x)
         missing = bool(unseen.any())
         cells = (np.where(unseen, -1, found) if missing else found).astype(np.int32)

@@ -55,7 +55,7 @@ class Part(nn.Module, ABC):
     @classmethod
     def from_config(cls: type[P], config: Mapping[str, Any], vsa: VSA) -> P:
         """Make a plan (a part without codebooks) from what `config` returned."""
-        return cls(vsa, **{key: value for key, value in config.items() if key != "name"})  # type: ignore[call-arg]
+        return cls(vsa, **{key: value for key, value in config.items() if key != "name"})  # type: ignore[call-arg] (subclasses take more)
 
     def check(self) -> None:
         """Raise `ValueError` that names the tensor if one holds values that cannot have been drawn."""

@@ -35,9 +35,7 @@ class Bundle(Policy):
     def __init__(self, bank: BehaviourBank, weights: Mapping[str, float] | None = None) -> None:
         super().__init__(bank, bank.names)
         self.weights = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
-        """One weight per name; ints if all of them are whole."""
-        if all(weight.is_integer() for weight in self.weights):
-            self.weights = [int(weight) for weight in self.weights]
+        """One weight per name."""
         if not any(self.weights):
             raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
         self.behaviour = Behaviour.sum(self.parts, self.weights)

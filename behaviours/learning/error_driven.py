@@ -18,7 +18,7 @@ from behaviours.learning.samples import Contradictions, Samples, check_contradic
 from behaviours.options import as_bool, as_float, as_int, set_fields
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
-from torchvsa import VSA
+from torchvsa import VSA, Readout
 from torchvsa._numerics import as_bipolar, is_integer, norms
 
 
@@ -125,13 +125,14 @@ class ErrorDriven(Rule):
         visits = reported = 0
         stalled = False
         exact = pairs.vsa.integer and is_integer(program)
+        readout = pairs.readout.of(program)
         while len(corrections) < self.epochs:
             corrected = start = 0
             size = _BLOCK
             while start < len(pairs):
                 # Pairs before the first incorrect one do not change the program, so a block of them is scored at
                 # once. After a correction the next block starts behind the corrected pair.
-                short, rivals, rival_scores = pairs.judge(program, start, size)
+                short, rivals, rival_scores = pairs.judge(readout, start, size)
                 if visits + start - reported >= _PAIRS_PER_REPORT:
                     reported = visits + start
                     progress(reported / (self.epochs * len(pairs)))
@@ -143,6 +144,7 @@ class ErrorDriven(Rule):
                 rival = int(rivals[offset]) if rival_scores[offset] > 0 else None
                 change = pairs.change(start + offset, rival)
                 program = program + change
+                readout = pairs.readout.of(program)
                 if self.average:
                     weighted = weighted + (visits + start + offset) * change.to(weighted.dtype)
                 corrected += 1
@@ -205,16 +207,16 @@ class _Pairs:
         return len(self.targets)
 
     def judge(
-        self, program: Shaped[Tensor, "d"], start: int, size: int
+        self, readout: Readout, start: int, size: int
     ) -> tuple[Bool[Tensor, "rows"], Int64[Tensor, "rows"], Float64[Tensor, "rows"]]:
         """For the block of pairs from `start` on: whether each lacks its margin, its rival, and the rival's score."""
-        return self._judge(self._scores(program, start, size), start)
+        return self._judge(readout(self.conditions[start : start + size]), start)
 
     def outcome(self, program: Shaped[Tensor, "d"]) -> tuple[int, int]:
         """The number of pairs recalled wrongly, and of pairs recalled wrongly or below the margin."""
-        wrong = short = 0
+        wrong, short, readout = 0, 0, self.readout.of(program)
         for start in range(0, len(self), _BLOCK):
-            scores = self._scores(program, start, _BLOCK)
+            scores = readout(self.conditions[start : start + _BLOCK])
             wrong += int((scores.argmax(-1) != self.targets[start : start + _BLOCK]).sum())
             short += int(self._judge(scores, start)[0].sum())
         return wrong, short
@@ -226,9 +228,6 @@ class _Pairs:
         if rival is not None:
             change = change - self.vsa.superpose(self.vsa.bind(self.items[rival], condition)[None])
         return change
-
-    def _scores(self, program: Shaped[Tensor, "d"], start: int, size: int) -> Float64[Tensor, "rows r"]:
-        return self.readout.of(program)(self.conditions[start : start + size])
 
     def _judge(
         self, scores: Float64[Tensor, "rows r"], start: int

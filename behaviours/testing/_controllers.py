@@ -44,7 +44,9 @@ def _alike(controller: Controller, a: Recall, b: Recall) -> None:
 
 
 def _joined(recalls: Sequence[Recall]) -> Recall:
-    return Recall(*(None if parts[0] is None else torch.cat(parts) for parts in zip(*recalls, strict=True)))  # type: ignore[arg-type]
+    fields: Any = zip(*recalls, strict=True)
+    columns: Any = (None if parts[0] is None else torch.cat(parts) for parts in fields)
+    return Recall(*columns)
 
 
 def _drive(controller: Controller, sequence: Float64[Tensor, "steps robots n"]) -> tuple[list[Recall], Any]:

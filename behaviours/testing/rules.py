@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import wraps
 from itertools import pairwise
+from typing import Any
 
 import torch
 
@@ -254,8 +255,8 @@ def _partial_fit_continues_or_raises_value_error(case: Trial) -> None:
 def _invalid_demonstrations_raise_value_error(case: Trial) -> None:
     good, schema = case.shown(), case.space.schema
 
-    def refused(sensors: torch.Tensor, commands: torch.Tensor, **names: list[str]) -> None:
-        shown = Demonstrations(sensors, commands, torch.arange(len(sensors)), **names)  # type: ignore[arg-type]
+    def refused(sensors: torch.Tensor, commands: torch.Tensor, **names: Any) -> None:
+        shown = Demonstrations(sensors, commands, torch.arange(len(sensors)), **names)
         refuses(ValueError, lambda: case.fit(shown))
 
     unobserved = torch.full_like(good.sensors[:1], torch.nan)

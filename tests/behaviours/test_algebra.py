@@ -74,7 +74,7 @@ def test_what_is_taken_away_again_leaves_no_trace(vsa: str) -> None:
     assert torch.equal((everything - avoid - flee).program, seek.program)
     opposite = -everything
     assert same(-opposite, everything)
-    assert same(sum([seek, avoid, flee]), everything)  # type: ignore[arg-type]
+    assert same(sum([seek, avoid, flee]), everything)  # type: ignore[arg-type] (`sum` begins with 0)
 
 
 def test_results_are_counted() -> None:
@@ -168,7 +168,7 @@ def test_wrong_sums_are_refused() -> None:
         with pytest.raises(TypeError):
             _ = seek + wrong
     with pytest.raises(TypeError):
-        _ = seek * bank["avoid"]  # type: ignore[operator]
+        _ = seek * bank["avoid"]  # type: ignore[operator] (refused)
 
 
 def test_forged_terms_are_refused(tmp_path: Path) -> None:
@@ -198,6 +198,6 @@ def test_forged_terms_are_refused(tmp_path: Path) -> None:
 
 def test_a_report_of_terms_is_a_tuple_of_texts() -> None:
     with pytest.raises(ValueError, match="terms of a report"):
-        LearningReport("sum", 1, 1, terms="seek")  # type: ignore[arg-type]
+        LearningReport("sum", 1, 1, terms="seek")  # type: ignore[arg-type] (refused)
     with pytest.raises(ValueError, match="terms of a report"):
-        LearningReport("sum", 1, 1, terms=(1,))  # type: ignore[arg-type]
+        LearningReport("sum", 1, 1, terms=(1,))  # type: ignore[arg-type] (refused)

@@ -150,4 +150,4 @@ def test_a_broken_rule_is_told_its_law(rule: Any, law: str) -> None:
 
 def test_a_rule_is_an_object() -> None:
     with pytest.raises(TypeError, match=r"write OneShot\(\)"):
-        check_rule(OneShot)  # type: ignore[arg-type]
+        check_rule(OneShot)  # type: ignore[arg-type] (refused)

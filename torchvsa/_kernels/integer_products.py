@@ -19,7 +19,7 @@ others or, in some versions, returns wrong results (pytorch/pytorch#107671)."""
 
 _INT8_TERMS = 2**17 - 32
 """This many products of int8 numbers, at most 2^14 each, sum up within int32; a multiple of `_TILE`."""
-_FLOAT_TERMS = 1023
+FLOAT_TERMS = 1023
 """This many products of int8 numbers sum up exactly in float32, below 2^24."""
 _HAS_UNITS = cpu._is_vnni_supported()
 """Whether the CPU has integer units (VNNI)."""
@@ -28,7 +28,7 @@ _HAS_UNITS = cpu._is_vnni_supported()
 def integer_products(a: Int8[Tensor, "rows d"], b: Int8[Tensor, "k d"]) -> Shaped[Tensor, "rows k"]:
     """`a @ b.T`, exact: in int32, or in int64 from d = 131,041 on."""
     units = a.device.type == "cuda" or (a.device.type == "cpu" and _HAS_UNITS and a.shape[1] > 1)
-    most, product = (_INT8_TERMS, by_units) if units else (_FLOAT_TERMS, by_floats)
+    most, product = (_INT8_TERMS, by_units) if units else (FLOAT_TERMS, by_floats)
     wide = torch.int32 if a.shape[1] <= _INT8_TERMS else torch.int64
     if a.shape[1] <= most:
         return product(a, b).to(wide)
@@ -39,7 +39,7 @@ def integer_products(a: Int8[Tensor, "rows d"], b: Int8[Tensor, "k d"]) -> Shape
 
 
 def by_floats(a: Int8[Tensor, "rows d"], b: Int8[Tensor, "k d"]) -> Float32[Tensor, "rows k"]:
-    """`a @ b.T` in float32, exact for `_FLOAT_TERMS` elements."""
+    """`a @ b.T` in float32, exact for `FLOAT_TERMS` elements."""
     return a.to(torch.float32) @ b.to(torch.float32).T
 
 

@@ -15,7 +15,7 @@ from torchvsa.errors import ShapeError
 from torchvsa.part import Layout, Part
 
 P = TypeVar("P", bound=Part)
-_ROUNDING = 2.0**-50
+ROUNDING = 2.0**-50
 """Bounds the three roundings in float64 between a reading and its bin."""
 
 UNOBSERVED = -1
@@ -150,7 +150,7 @@ def binned(x: Float[Tensor, "*batch"], bins: int | Int64[Tensor, "n"]) -> Int64[
     `bins` may be a tensor with one number per column (the last dimension of `x`). A value that equals an edge up to
     rounding in its type (7 of a range of 25, in 25 bins) is in the bin above the edge.
     """
-    rounding = max(_ROUNDING, torch.finfo(x.dtype).eps)
+    rounding = max(ROUNDING, torch.finfo(x.dtype).eps)
     if isinstance(bins, Tensor):
         # Integers times a Python float would be of the default dtype.
         index = (x.to(torch.float64) * (bins.to(torch.float64) * (1 + rounding))).floor()

@@ -8,6 +8,8 @@ from jaxtyping import TypeCheckError
 from torch import Tensor
 from torch.testing import assert_close
 
+from torchvsa.architectures import VSA
+
 T = TypeVar("T")
 
 
@@ -40,6 +42,11 @@ def refuses(error: type[Exception], call: Callable[[], object]) -> None:
     except (error, TypeCheckError):
         return
     raise AssertionError(f"no {error.__name__} was raised")
+
+
+def draw(vsa: VSA, *shape: int, seed: int = 0) -> Tensor:
+    """Random hypervectors `[*shape, d]`, always the same."""
+    return vsa.random(*shape, generator=seeded(seed))
 
 
 def seeded(seed: int) -> torch.Generator:

@@ -3,29 +3,24 @@
 from collections.abc import Callable
 
 import torch
-from torch import Tensor
 from torch.testing import assert_close
 
 from torchvsa._numerics import norms
 from torchvsa.architectures import VSA
-from torchvsa.testing._laws import seeded
-
-
-def _draw(vsa: VSA, *shape: int, seed: int = 0) -> Tensor:
-    return vsa.random(*shape, generator=seeded(seed))
+from torchvsa.testing._laws import draw
 
 
 def _unbind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
-    xs, key, weights = _draw(vsa, 6), _draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
+    xs, key, weights = draw(vsa, 6), draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
     raw = vsa.superpose(xs, weights=weights)
     assert_close(vsa.unbind(raw, key), vsa.superpose(vsa.unbind(xs, key), weights=weights))
 
 
 def _a_readout_unbinds_and_compares(vsa: VSA) -> None:
     programs, conditions, items = (
-        vsa.superpose(_draw(vsa, 2, 9), -2),
-        vsa.bundle(_draw(vsa, 4, 3, seed=1)),
-        _draw(vsa, 5),
+        vsa.superpose(draw(vsa, 2, 9), -2),
+        vsa.bundle(draw(vsa, 4, 3, seed=1)),
+        draw(vsa, 5),
     )
     for program in (programs[0], programs):
         noisy = vsa.unbind(program, conditions if program.dim() == 1 else conditions[:, None])
@@ -39,7 +34,7 @@ def _a_readout_unbinds_and_compares(vsa: VSA) -> None:
 
 
 def _unbound_norm_is_the_norm_of_the_unbound(vsa: VSA) -> None:
-    program, keys = vsa.superpose(_draw(vsa, 9)), vsa.bundle(_draw(vsa, 4, 3, seed=1))
+    program, keys = vsa.superpose(draw(vsa, 9)), vsa.bundle(draw(vsa, 4, 3, seed=1))
     expected = norms(vsa.unbind(program, keys))
     assert_close(vsa.unbound_norm(program, keys), expected, rtol=0 if vsa.integer else 1e-6, atol=0)
 

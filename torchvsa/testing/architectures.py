@@ -8,7 +8,7 @@ from torch.testing import assert_close
 
 from torchvsa.architectures import ARCHITECTURES, VSA, architecture
 from torchvsa.errors import ShapeError
-from torchvsa.testing._laws import check, refuses, require, same, seeded
+from torchvsa.testing._laws import check, draw, refuses, require, same, seeded
 from torchvsa.testing._readout import READOUT_LAWS
 
 
@@ -17,21 +17,17 @@ def check_architecture(vsa: VSA) -> None:
     check(vsa, _LAWS)
 
 
-def _draw(vsa: VSA, *shape: int, seed: int = 0) -> Tensor:
-    return vsa.random(*shape, generator=seeded(seed))
-
-
 def _chance(vsa: VSA) -> float:
     return 5 / vsa.dim**0.5
 
 
 def _the_seed_decides_the_atoms(vsa: VSA) -> None:
-    same(_draw(vsa, 3, 2, seed=4), _draw(vsa, 3, 2, seed=4))
-    require(not torch.equal(_draw(vsa, 3, seed=4), _draw(vsa, 3, seed=5)))
+    same(draw(vsa, 3, 2, seed=4), draw(vsa, 3, 2, seed=4))
+    require(not torch.equal(draw(vsa, 3, seed=4), draw(vsa, 3, seed=5)))
 
 
 def _atoms_are_codes_of_their_own_type(vsa: VSA) -> None:
-    atoms = _draw(vsa, 2, 3)
+    atoms = draw(vsa, 2, 3)
     require(atoms.shape == (2, 3, vsa.dim), f"shape {tuple(atoms.shape)}")
     vsa.check_codes(atoms, "random hypervectors")
     vsa.check(vsa.identity(), "the identity")
@@ -39,7 +35,7 @@ def _atoms_are_codes_of_their_own_type(vsa: VSA) -> None:
 
 
 def _atoms_are_unrelated(vsa: VSA) -> None:
-    atoms = _draw(vsa, 20)
+    atoms = draw(vsa, 20)
     gram = vsa.similarity(atoms[:, None], atoms)
     assert_close(gram.diagonal(), torch.ones(20))
     require((gram - torch.eye(20)).abs().max() < _chance(vsa))
@@ -47,18 +43,18 @@ def _atoms_are_unrelated(vsa: VSA) -> None:
 
 def _bind_commutes_and_associates(vsa: VSA) -> None:
     if vsa.commutative:
-        a, b, c = _draw(vsa, 3)
+        a, b, c = draw(vsa, 3)
         assert_close(vsa.bind(a, b), vsa.bind(b, a))
         assert_close(vsa.bind(vsa.bind(a, b), c), vsa.bind(a, vsa.bind(b, c)))
 
 
 def _bound_is_dissimilar_to_both(vsa: VSA) -> None:
-    a, b = _draw(vsa, 2)
+    a, b = draw(vsa, 2)
     require(vsa.similarity(vsa.bind(a, b), torch.stack([a, b])).abs().max() < _chance(vsa))
 
 
 def _unbind_undoes_bind(vsa: VSA) -> None:
-    a, key = _draw(vsa, 2, 10)
+    a, key = draw(vsa, 2, 10)
     recovered = vsa.unbind(vsa.bind(a, key), key)
     if vsa.self_inverse:
         assert_close(recovered, a)
@@ -68,13 +64,13 @@ def _unbind_undoes_bind(vsa: VSA) -> None:
 
 
 def _the_identity_binds_to_nothing(vsa: VSA) -> None:
-    a = _draw(vsa, 3)
+    a = draw(vsa, 3)
     assert_close(vsa.bind(a, vsa.identity()), a)
     assert_close(vsa.unbind(a, vsa.identity()), a)
 
 
 def _bind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
-    xs, key, weights = _draw(vsa, 6), _draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
+    xs, key, weights = draw(vsa, 6), draw(vsa, seed=1), torch.tensor([1, 2, 0, -1, 3, 1])
     raw = vsa.superpose(xs, weights=weights)
     assert_close(vsa.permute(raw, 7), vsa.superpose(vsa.permute(xs, 7), weights=weights))
     assert_close(vsa.bind(raw, key), vsa.superpose(vsa.bind(xs, key), weights=weights))
@@ -84,13 +80,13 @@ def _bind_is_linear_over_a_raw_accumulator(vsa: VSA) -> None:
 
 
 def _superpose_adds_up(vsa: VSA) -> None:
-    xs = _draw(vsa, 5)
+    xs = draw(vsa, 5)
     assert_close(vsa.superpose(xs[:2]) + vsa.superpose(xs[2:]), vsa.superpose(xs))
     require(vsa.superpose(xs).dtype == vsa.accumulator, "sums are not of the type `accumulator`")
 
 
 def _a_bundle_resembles_its_members_only(vsa: VSA) -> None:
-    atoms = _draw(vsa, 10)
+    atoms = draw(vsa, 10)
     similarity = vsa.similarity(vsa.bundle(atoms[:5]), atoms)
     # The majority keeps the least: for each of 5 summands a similarity of C(4, 2) / 2^4 = 3/8.
     require(similarity[:5].min() > 3 / 8 - _chance(vsa), f"members: {similarity[:5].tolist()}")
@@ -98,18 +94,18 @@ def _a_bundle_resembles_its_members_only(vsa: VSA) -> None:
 
 
 def _a_bundle_does_not_depend_on_order(vsa: VSA) -> None:
-    xs = _draw(vsa, 7)
+    xs = draw(vsa, 7)
     assert_close(vsa.bundle(xs[torch.tensor([3, 6, 0, 5, 1, 4, 2])]), vsa.bundle(xs))
 
 
 def _two_are_bundled_as_any_number_is(vsa: VSA) -> None:
-    a, b = _draw(vsa, 4, 3), _draw(vsa, 3)
+    a, b = draw(vsa, 4, 3), draw(vsa, 3)
     for x, y in ((a, b), (a[0], a[1]), (vsa.bundle(a, 0), b)):
         same(vsa._bundle_pair(x, y), vsa.bundle(torch.stack(torch.broadcast_tensors(x, y.to(x.dtype)), -2)))
 
 
 def _bundle_sums_over_any_dimension(vsa: VSA) -> None:
-    xs = _draw(vsa, 3, 4, 5)
+    xs = draw(vsa, 3, 4, 5)
     for dim in (0, 1, 2, -2, -3):
         weights = torch.tensor([1, 3, 2, 1, 1])[: xs.shape[dim]]
         rows = xs.movedim(dim, -2).flatten(0, 1)
@@ -119,7 +115,7 @@ def _bundle_sums_over_any_dimension(vsa: VSA) -> None:
 
 
 def _integer_weights_repeat_and_zero_weights_leave_out(vsa: VSA) -> None:
-    xs = _draw(vsa, 4)
+    xs = draw(vsa, 4)
     # An even number of summands, so that a majority has ties.
     for weights in ([1, 2, 1, 0], [0, 1, 2, 3], [0, 1, 0, 1]):
         repeated = xs.repeat_interleave(torch.tensor(weights), 0)
@@ -127,21 +123,21 @@ def _integer_weights_repeat_and_zero_weights_leave_out(vsa: VSA) -> None:
 
 
 def _each_batch_element_may_have_its_own_weights(vsa: VSA) -> None:
-    xs = _draw(vsa, 3, 4)
+    xs = draw(vsa, 3, 4)
     weights = torch.tensor([[1, 1, 1, 1], [0, 1, 0, 1], [2, 0, 1, 1]])
     singles = torch.stack([vsa.bundle(x, weights=w) for x, w in zip(xs, weights, strict=True)])
     same(vsa.bundle(xs, weights=weights), singles)
 
 
 def _real_weights_scale_the_members(vsa: VSA) -> None:
-    a, b = _draw(vsa, 2)
+    a, b = draw(vsa, 2)
     raw = vsa.superpose(torch.stack([a, b]), weights=torch.tensor([0.25, 0.75]))
     expected = torch.tensor([1.0, 3.0]) / 10**0.5
     assert_close(vsa.similarity(raw, torch.stack([a, b])), expected, atol=_chance(vsa), rtol=0)
 
 
 def _permute_rotates_keeps_similarity_and_is_undone(vsa: VSA) -> None:
-    a, b = _draw(vsa), vsa.bundle(_draw(vsa, 3))
+    a, b = draw(vsa), vsa.bundle(draw(vsa, 3))
     rotated = vsa.permute(a, 17)
     require(abs(vsa.similarity(rotated, a)) < _chance(vsa))
     assert_close(vsa.similarity(rotated, vsa.permute(b, 17)), vsa.similarity(a, b))
@@ -151,8 +147,8 @@ def _permute_rotates_keeps_similarity_and_is_undone(vsa: VSA) -> None:
 
 
 def _a_batch_is_its_singles(vsa: VSA) -> None:
-    a, b = _draw(vsa, 2, 5)
-    xs = _draw(vsa, 5, 4, seed=1)
+    a, b = draw(vsa, 2, 5)
+    xs = draw(vsa, 5, 4, seed=1)
     raw = vsa.superpose(xs)
     shifts = torch.tensor([0, 1, -1, 700, 5000])
     verbs: list[tuple[Callable[..., Tensor], tuple[Tensor, ...]]] = [
@@ -173,15 +169,15 @@ def _a_batch_is_its_singles(vsa: VSA) -> None:
 
 
 def _an_empty_batch_gives_an_empty_batch(vsa: VSA) -> None:
-    nothing, key = _draw(vsa, 0), _draw(vsa)
+    nothing, key = draw(vsa, 0), draw(vsa)
     for result in (vsa.bind(nothing, key), vsa.unbind(key, nothing), vsa.permute(nothing, torch.empty(0).long())):
         require(result.shape == (0, vsa.dim))
-    require(vsa.bundle(_draw(vsa, 0, 3)).shape == (0, vsa.dim))
+    require(vsa.bundle(draw(vsa, 0, 3)).shape == (0, vsa.dim))
     require(vsa.similarity(nothing, key).shape == (0,))
 
 
 def _similarity_is_symmetric_and_bounded(vsa: VSA) -> None:
-    x = torch.cat([vsa.superpose(_draw(vsa, 6, 3)), 1000 * vsa.superpose(_draw(vsa, 1, 1, seed=1))])
+    x = torch.cat([vsa.superpose(draw(vsa, 6, 3)), 1000 * vsa.superpose(draw(vsa, 1, 1, seed=1))])
     gram = vsa.similarity(x[:, None], x)
     same(gram, gram.T)
     require(gram.abs().max() <= 1 + 1e-6)
@@ -190,14 +186,14 @@ def _similarity_is_symmetric_and_bounded(vsa: VSA) -> None:
 
 def _a_zero_vector_is_similar_to_nothing(vsa: VSA) -> None:
     zero = torch.zeros(vsa.dim, dtype=vsa.accumulator)
-    require(vsa.similarity(zero, _draw(vsa)) == 0)
+    require(vsa.similarity(zero, draw(vsa)) == 0)
     require(vsa.similarity(zero, zero) == 0)
 
 
 def _a_zero_vector_has_a_gradient_without_nan(vsa: VSA) -> None:
     if vsa.integer:
         return
-    a = torch.cat([torch.zeros(1, vsa.dim, dtype=vsa.dtype), _draw(vsa, 2)]).requires_grad_()
+    a = torch.cat([torch.zeros(1, vsa.dim, dtype=vsa.dtype), draw(vsa, 2)]).requires_grad_()
     loss = vsa.similarity(a[:, None], a).sum() + vsa.unbound_norm(a[0], a).sum() + vsa.bundle(a[:1]).abs().sum()
     (gradient,) = torch.autograd.grad(loss, a)
     require(gradient.isfinite().all())
@@ -206,11 +202,11 @@ def _a_zero_vector_has_a_gradient_without_nan(vsa: VSA) -> None:
 
 def _a_negative_is_opposite(vsa: VSA) -> None:
     if vsa.negatable:
-        a = _draw(vsa, 3)
+        a = draw(vsa, 3)
         assert_close(vsa.similarity(a, vsa.negative(a)), -torch.ones(3))
         same(vsa.negative(vsa.negative(a)), a)
     else:
-        refuses(ValueError, lambda: vsa.negative(_draw(vsa)))
+        refuses(ValueError, lambda: vsa.negative(draw(vsa)))
 
 
 def _angles_add_up_under_binding(vsa: VSA) -> None:
@@ -228,14 +224,14 @@ def _a_dim_that_is_not_allowed_is_refused(vsa: VSA) -> None:
     require(vsa.allows_dim(vsa.dim), f"its own dim, {vsa.dim}, is not allowed")
     for dim in range(max(vsa.dim - 3, 1), vsa.dim + 4):
         if vsa.name in ARCHITECTURES and not vsa.allows_dim(dim):
-            refuses(ValueError, lambda dim=dim: architecture(**(vsa.config() | {"dim": dim})))  # type: ignore[arg-type]
+            refuses(ValueError, lambda dim=dim: architecture(**(vsa.config() | {"dim": dim})))  # type: ignore[arg-type] (plain values)
 
 
 def _it_is_made_again_from_its_config(vsa: VSA) -> None:
     require(set(vsa.config()) >= {"name", "dim", "dtype"})
     if vsa.name in ARCHITECTURES:
         for dim in filter(vsa.allows_dim, range(vsa.dim, vsa.dim + 2)):
-            again = architecture(**(vsa.config() | {"dim": dim}))  # type: ignore[arg-type]
+            again = architecture(**(vsa.config() | {"dim": dim}))  # type: ignore[arg-type] (plain values)
             require((again == vsa) == (dim == vsa.dim), f"{again} is compared wrongly")
             require(again != vsa or hash(again) == hash(vsa))
 
