@@ -15,8 +15,9 @@ from sklearn.tree import DecisionTreeClassifier
 import sim
 import torchvsa
 from behaviours import Behaviour, BehaviourBank, Demonstrations, LearningReport, Policy, Space
-from experiments import draws, hand_written, presets
+from experiments import presets
 from experiments.agreement import share_right
+from experiments.models import draws, hand_written
 
 
 @dataclass(frozen=True)

@@ -24,13 +24,14 @@ from rich.table import Table
 
 import sim
 from behaviours import Behaviour, BehaviourBank, Policy, Space
-from experiments import hand_written, presets
+from experiments import presets
 from experiments.agreement import Agreement, measure
 from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.controllers import CONTROLLERS, Study, TableRow
 from experiments.driving import Driver, progress_bars, workers
 from experiments.lessons import FIRST_DEMONSTRATION, FIRST_VALIDATION, from_file, shown_in
+from experiments.models import hand_written
 from experiments.results import Results, Row
 
 COLUMNS = (

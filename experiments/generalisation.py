@@ -25,10 +25,10 @@ from experiments import generalisation_corral as corral
 from experiments import generalisation_fit_times as fit_times
 from experiments import generalisation_smooth as smooth
 from experiments import generalisation_wall_following as wall_following
-from experiments import torchhd_classifiers
 from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.driving import progress_bars, workers
+from experiments.models import torchhd as torchhd_classifiers
 from experiments.results import Results, Row
 
 PARTS = ("corral", "wall_following", "smooth", "fit_times")

@@ -9,8 +9,8 @@ from typing import Any
 import torch
 from rich.progress import Progress
 
-from experiments import torchhd_classifiers
 from experiments.generalisation_wall_following import FOLDS, fit_and_ask
+from experiments.models import torchhd as torchhd_classifiers
 from experiments.results import Row
 
 MODELS = ("one_hypervector", "torchhd_adapthd")

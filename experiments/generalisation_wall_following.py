@@ -28,11 +28,11 @@ from sklearn.tree import DecisionTreeClassifier
 
 from behaviours import BehaviourClassifier
 from behaviours.data import load_wall_following
-from experiments import torchhd_classifiers
 from experiments.choices import check_chosen
 from experiments.jobs import run_jobs
+from experiments.models import torchhd as torchhd_classifiers
+from experiments.models.torchhd import TorchHD
 from experiments.results import Row
-from experiments.torchhd_classifiers import TorchHD
 
 FOLDS = 5
 Fold = tuple[NDArray[np.int64], NDArray[np.int64]]

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import sim
-from experiments import draws
+from experiments.models import draws
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]

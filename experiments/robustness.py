@@ -27,7 +27,7 @@ from rich.progress import Progress
 import sim
 import torchvsa
 from behaviours import Demonstrations
-from experiments import hand_written, presets
+from experiments import presets
 from experiments.choices import check_chosen
 from experiments.command_line import errors_in_one_line, job
 from experiments.damage import DAMAGES, PARAMETERS, PARTS, Damage, Damaged, Floats, Learner
@@ -35,6 +35,7 @@ from experiments.damaged_programs import Programmed
 from experiments.damaged_rivals import Network, Tree
 from experiments.driving import Driver, progress_bars, workers
 from experiments.lessons import FIRST_DEMONSTRATION, shown_in
+from experiments.models import hand_written
 from experiments.results import Results, Row
 
 

@@ -1,7 +1,6 @@
 """The capacity study: pairs are counted as the printed algorithms answer, and the search finds what there is."""
 
 import importlib
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, cast
@@ -10,17 +9,16 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from commands import only, output_of, results
-from hydra import compose, initialize_config_module
-from omegaconf import OmegaConf
+from kits import composed
 
-from experiments import capacity
-from experiments.capacity import check, predicted
-from experiments.pairs_held import CONDITIONS, bracket, expected, halve, measure, parts, random_pairs, recalled
+from experiments.capacity import Capacity, made, measure, study
+from experiments.kit.run import check_all
+from experiments.main import main
+from experiments.tasks.random_pairs import CONDITIONS, bracket, expected, halve, predicted, random_pairs, recalled
 
 
-def settings(*overrides: str) -> dict[str, Any]:
-    with initialize_config_module("experiments.conf", version_base="1.3"):
-        return cast(dict[str, Any], OmegaConf.to_container(compose("capacity", list(overrides)), resolve=True))
+def settings(*overrides: str) -> Capacity:
+    return cast(Capacity, composed(study, *overrides))
 
 
 @pytest.fixture
@@ -44,7 +42,7 @@ def test_the_pairs_are_distinct_and_fewer_are_the_first_of_more() -> None:
 @pytest.mark.parametrize(("row", "clip"), [("literal", True), ("OneShot_mean", False), ("OneShot_sum", False)])
 def test_recall_is_counted_as_the_printed_algorithms_answer(oracle: Any, row: str, clip: bool) -> None:
     shown = random_pairs(40, 7)
-    rule, space = parts(settings(), row, 300, 7)
+    rule, space = made(settings(), row, 300, 7)
     encoder = oracle.Encoder.of(space)
     sensors, commands = shown.sensors.tolist(), shown.commands.tolist()
     learned = oracle.learn(encoder, sensors, commands, clip_each_step=clip)
@@ -59,29 +57,30 @@ def test_recall_is_counted_as_the_printed_algorithms_answer(oracle: Any, row: st
 
 def test_a_measurement_reports_what_it_asked() -> None:
     config = settings("dims=[64,128]", "pairs=[4,8,16,32]", "precision=0.0")
-    found, rows = measure(config, "OneShot_sum", 128, 1)
+    rows = measure(config, {"learner": "OneShot_sum", "dim": 128, "repeat": 1})
+    found = rows[0]["held"]
     shares = {row["pairs"]: row["recall"] for row in rows}
     assert len(shares) == len(rows)
     assert {4, 8, 16} <= set(shares)
     assert shares[found] >= 0.99
     assert shares[found + 1] < 0.99
     seed = int(np.random.SeedSequence([0, 1]).generate_state(1)[0])
-    rule, space = parts(config, "OneShot_sum", 128, seed)
+    rule, space = made(config, "OneShot_sum", 128, seed)
     shown = random_pairs(found + 1, seed)
     assert recalled(rule.fit(space, shown), shown) == shares[found + 1]
     # With a smaller dimension the search begins from the guess.
-    smaller, rows = measure(config, "OneShot_sum", 64, 1)
-    assert smaller < found
+    rows = measure(config, {"learner": "OneShot_sum", "dim": 64, "repeat": 1})
+    assert rows[0]["held"] < found
     assert rows[0]["pairs"] == 1
 
 
 def test_a_curve_ends_where_little_is_left() -> None:
     config = settings("dims=[64]", "pairs=[200,2,400,100]", "until=0.7")
-    found, rows = measure(config, "OneShot_sum", 64, 0)
+    rows = measure(config, {"learner": "OneShot_sum", "dim": 64, "repeat": 0})
     asked = [row["pairs"] for row in rows]
     assert asked[:2] == [2, 100]
     assert 200 not in asked
-    assert 2 <= found < 100
+    assert 2 <= rows[0]["held"] < 100
 
 
 def up_to(limit: int, asked: list[int]) -> Callable[[int], bool]:
@@ -111,7 +110,7 @@ def test_the_closed_form_is_that_of_a_raw_sum() -> None:
     """Averaged over six draws of 60 pairs at d = 700: a standard error of about .009."""
     shares = []
     for seed in range(6):
-        rule, space = parts(settings(), "OneShot_sum", 700, seed)
+        rule, space = made(settings(), "OneShot_sum", 700, seed)
         shown = random_pairs(60, seed)
         shares.append(recalled(rule.fit(space, shown), shown))
     assert np.mean(shares) == pytest.approx(expected(700, 60), abs=0.03)
@@ -123,20 +122,20 @@ def test_the_closed_form_is_that_of_a_raw_sum() -> None:
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ("rows=[nobody]", "rows: there is no 'nobody'"),
-        ("rows=[]", "rows is empty; choose from literal, "),
+        ("rows=[nobody]", "rows: there is no 'nobody'; choose from literal, "),
+        ("rows=[]", "rows is empty"),
         ("dims=[100,100]", "dims names 100 2 times"),
-        ("dims=[0]", "dims are whole numbers from 1; got 0"),
-        ("pairs=[9000]", "pairs are whole numbers from 1 to 8000; got 9000"),
-        ("accuracy=1.0", "accuracy is a share between 0 and 1"),
-        ("learners.Gradient.codes=secret", "there are no codes 'secret'"),
+        ("dims=[0]", r"dims=\[0\]: expected 1 or more"),
+        ("pairs=[9000]", r"pairs=\[9000\]: expected a number from 1 to 8000"),
+        ("accuracy=1.0", "accuracy=1: expected more than 0 and less than 1"),
+        ("learners.Gradient.codes.record=secret", "no encoder 'secret'"),
         ("learners.Gradient.rule.name=guess", "no learning rule 'guess'"),
-        ("vsa={name: HRR, dtype: float32}", "LeastSquares: the rule least_squares cannot train programs of HRR"),
+        ("vsa=hrr", "the rule least_squares cannot train programs of HRR"),
     ],
 )
 def test_wrong_settings_are_named(override: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        check(settings(override))
+        check_all(study, settings(override))
 
 
 TINY = (
@@ -152,7 +151,7 @@ TINY = (
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("capacity")
-    return folder, output_of(folder, *TINY, module="experiments.capacity")
+    return folder, output_of(folder, "capacity", *TINY, module="experiments")
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:
@@ -164,7 +163,7 @@ def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -
         (learner, dim) for learner in ("literal", "OneShot_sum", "Gradient", "closed_form") for dim in (60, 120)
     ]
     for (learner, dim), row in rows.items():
-        name = f"capacity.{learner}.{dim}.pairs_at_99"
+        name = f"{learner}.{dim}.pairs"
         assert content["metrics"][name] == row["pairs"]
         if learner == "closed_form":
             assert row["pairs"] == predicted(dim, 0.99)
@@ -178,7 +177,7 @@ def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -
     assert rows["Gradient", 120]["pairs"] > 2 * rows["OneShot_sum", 120]["pairs"] > 0
     assert rows["Gradient", 120]["pairs"] > rows["Gradient", 60]["pairs"]
     shares = [r["recall"] for r in records if (r["learner"], r["dim"], r["pairs"]) == ("Gradient", 120, 30)]
-    assert content["metrics"]["capacity.Gradient.120.recall_of_30"] == np.median(shares)
+    assert content["metrics"]["Gradient.120.recall_of_30"] == np.median(shares)
     assert "closed_form" in printed
     assert only(folder, "report.html").read_text().count("data:image/png;base64,") == 1
     assert only(folder, "capacity.png").read_bytes().startswith(b"\x89PNG")
@@ -189,9 +188,8 @@ def test_a_wrong_setting_is_told_in_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command changes
-    monkeypatch.setattr(sys, "argv", ["capacity", "rows=[nobody]"])
     with pytest.raises(SystemExit) as exit_:
-        capacity.main()
+        main(["capacity", "rows=[nobody]"])
     assert exit_.value.code == 1
     error = capsys.readouterr().err
     assert error.startswith("capacity: rows: there is no 'nobody'; choose from literal, ")

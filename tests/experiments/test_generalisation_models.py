@@ -14,7 +14,7 @@ from experiments import generalisation
 from experiments import generalisation_fit_times as fit_times
 from experiments import generalisation_smooth as smooth
 from experiments import generalisation_wall_following as wall
-from experiments.torchhd_classifiers import TorchHD, installed
+from experiments.models.torchhd import TorchHD, installed
 
 
 def test_stratified_folds_are_drawn_with_seed_0_and_spread_every_class() -> None:

@@ -9,7 +9,7 @@ import torch
 import sim
 import torchvsa
 from behaviours import Behaviour, Controller
-from experiments import hand_written
+from experiments.models import hand_written
 from sim.teacher import TEACHER_COMMANDS
 
 READINGS = np.array(list(product([0.5, 5.0], [0.5, 5.0], [0.1, 0.9])))

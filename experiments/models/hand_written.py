@@ -14,8 +14,8 @@ from torch import Tensor
 import sim
 from behaviours import Behaviour, LearningReport, Schema, Sensor, Space
 from behaviours.ordered import distinct_rows
-from experiments.largest_margin import largest_margin, margin, whole
-from experiments.presets import schema as learners_schema
+from experiments.models.largest_margin import largest_margin, margin, whole
+from experiments.tasks.corral import schema as learners_schema
 from sim.sensors import LIGHT_MAX
 from sim.teacher import OBSTACLE, TEACHER_COMMANDS
 from torchvsa import VSA

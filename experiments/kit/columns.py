@@ -1,0 +1,141 @@
+"""Tables: their columns are declared once, and shown on the terminal, on a page and in Markdown.
+
+>>> table = Table("Recall", [Column("learner"), Column("recall", format=".2f", best="max")])
+>>> table.show([{"learner": "one_shot", "recall": 0.9}, {"learner": "gradient", "recall": None}]).markdown()
+'| learner | recall |\n| --- | ---: |\n| one_shot | 0.90 |\n| gradient | - |'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import rich.table
+
+NONE = "-"
+"""How a value that does not exist is shown."""
+
+Row = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell of a table as text; `mark` says whether it stands out, and how."""
+
+    text: str
+    mark: Literal["", "best", "bad"] = ""
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column.
+
+    Attributes:
+        key: of the rows' values.
+        label: its title; by default the key with spaces.
+        format: of a number, as in Python's format strings; or a function of the whole row that returns text.
+        interval: the keys of a lower and an upper bound, shown after the value.
+        best: which value is marked, if any.
+        alike: a key whose values must be equal in all rows, or nothing is marked: what was measured on other samples
+            does not compare.
+        bad: which values are marked as bad.
+        about: the definition that stands below the table.
+    """
+
+    key: str
+    label: str = ""
+    format: str | Callable[[Row], str] = ""
+    interval: tuple[str, str] | None = None
+    best: Literal["", "max", "min"] = ""
+    alike: str | None = None
+    bad: Callable[[Any], bool] | None = None
+    about: str = ""
+
+    @property
+    def title(self) -> str:
+        """The text above the column."""
+        return self.label or self.key.replace("_", " ")
+
+    def text(self, row: Row) -> str:
+        """The value of a row as text."""
+        if callable(self.format):
+            return self.format(row)
+        value = row.get(self.key)
+        if value is None or value != value:
+            return NONE
+        shown = number(value, self.format)
+        if self.interval is not None and row.get(self.interval[0]) is not None:
+            low, high = (number(row[end], self.format) for end in self.interval)
+            shown += f" [{low}, {high}]"
+        return shown
+
+    def cells(self, rows: Sequence[Row]) -> list[Cell]:
+        """The column's cells, with the best and the bad ones marked."""
+        known = [row[self.key] for row in rows if isinstance(row.get(self.key), int | float)]
+        alike = self.alike is None or len({row.get(self.alike) for row in rows}) == 1
+        best = None
+        if self.best and alike and len(set(known)) > 1:
+            best = {"max": max, "min": min}[self.best](known)
+        return [Cell(self.text(row), self._mark(row.get(self.key), best)) for row in rows]
+
+    def _mark(self, value: object, best: object) -> Literal["", "best", "bad"]:
+        if value is None:
+            return ""
+        if self.bad is not None and self.bad(value):
+            return "bad"
+        return "best" if value == best else ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table's title, columns and caption, and its rows once it is shown."""
+
+    title: str
+    columns: Sequence[Column]
+    caption: str = ""
+    rows: Sequence[Row] = ()
+    words: bool = False
+    """Whether all columns hold words, as the first always does."""
+
+    def show(self, rows: Sequence[Row]) -> Table:
+        """The table with these rows. Columns in which no row has a value are left out."""
+        columns = [
+            column
+            for place, column in enumerate(self.columns)
+            if place == 0 or any(column.text(row) != NONE for row in rows)
+        ]
+        return replace(self, columns=columns, rows=list(rows))
+
+    @property
+    def cells(self) -> list[list[Cell]]:
+        """The cells, row by row."""
+        columns = [column.cells(self.rows) for column in self.columns]
+        return [list(row) for row in zip(*columns, strict=True)] if self.rows else []
+
+    def terminal(self) -> rich.table.Table:
+        """The table for rich's console."""
+        table = rich.table.Table(title=self.title)
+        for place, column in enumerate(self.columns):
+            table.add_column(column.title, justify="left" if place == 0 or self.words else "right", no_wrap=True)
+        for row in self.cells:
+            table.add_row(*(f"[bold green]{cell.text}" if cell.mark == "best" else cell.text for cell in row))
+        return table
+
+    def markdown(self) -> str:
+        """The table for a README or an issue."""
+        lines = [[column.title for column in self.columns]]
+        lines.append(["---", *("---" if self.words else "---:" for _ in self.columns[1:])])
+        lines += [[f"**{cell.text}**" if cell.mark == "best" else cell.text for cell in row] for row in self.cells]
+        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def number(value: object, form: str = "") -> str:
+    """A number in a format; whole numbers with commas, others with three digits, if none is given."""
+    if value is None:
+        return NONE
+    if isinstance(value, bool | str):
+        return str(value)
+    if form:
+        return format(value, form)
+    return f"{value:,}" if isinstance(value, int) else f"{value:.3f}"

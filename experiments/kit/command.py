@@ -1,0 +1,159 @@
+"""A study as a command: Hydra's overrides and sweeps, one line for what the user can mend, and a result folder."""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import os
+import re
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import Any
+
+import hydra
+from hydra.core.config_store import ConfigStore
+from hydra.core.hydra_config import HydraConfig
+from hydra.errors import HydraException
+from hydra.types import RunMode
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
+from rich.console import Console
+
+from experiments.kit import run as runs
+from experiments.kit.messages import in_words
+from experiments.kit.options import option_name, register_groups
+from experiments.kit.safety import refuse_code
+from experiments.kit.study import Study
+
+TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
+"""Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
+
+LONGEST_NAME = 80
+
+
+def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
+    """Run a study with Hydra's overrides, by default those of this process."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if {"--help", "-h"} & set(given):
+        from experiments.kit.help import print_help
+
+        print_help(study, Console())
+        return
+    with errors_in_one_line(study.name), ended_by_signals():
+        refuse_code(given)
+        register(study)
+        sys.argv[1:] = given  # where Hydra reads them
+        hydra.main(version_base="1.3", config_path="pkg://experiments.kit.conf", config_name=study.name)(_Job(study))()
+
+
+class _Job:
+    """One job of a study; it can be sent to another process."""
+
+    def __init__(self, study: Study) -> None:
+        self.study = study
+        self.__name__ = study.name
+
+    def __call__(self, cfg: DictConfig) -> float | None:
+        study = self.study
+        console = Console()
+        if not console.is_terminal:
+            console.width = 150  # a file has no width of its own; the tables need this much
+        # A sweep goes on after a job that failed, and Hydra then says which one it was.
+        alone = HydraConfig.get().mode == RunMode.RUN
+        with errors_in_one_line(study.name) if alone else nullcontext():
+            settings = runs.settings_of(study, cfg)
+            outcome = runs.run(study, settings, Path(HydraConfig.get().runtime.output_dir), console)
+        for table in study.shown(outcome):
+            console.print(table.terminal())
+        report = outcome.folder / "report.html"
+        console.print(f"{report} shows it; results.json and records.parquet lie beside it", soft_wrap=True)
+        return None if study.objective is None else outcome.metrics.get(study.objective)
+
+
+def register(study: Study) -> None:
+    """Put the settings of a study, its presets and all options into Hydra's store."""
+    store = ConfigStore.instance()
+    register_groups()
+    for name, preset in study.presets.items():
+        store.store(group="experiment", name=name, node=dict(preset), package="_global_")
+    store.store(name=study.name, node=primary(study))
+
+
+def primary(study: Study) -> type:
+    """The study's settings as Hydra's primary config: with the defaults of its groups, and where results lie."""
+    logging = {"override hydra/job_logging": "stdout"}
+    defaults = ["_self_", *_defaults(study.settings), {"experiment": None}, logging]
+    name = f"outputs/{study.name}/${{torchvsa.folder:${{hydra.job.override_dirname}}}}"
+    hydra_block = {
+        "run": {"dir": name},
+        "sweep": {"dir": f"outputs/{study.name}/sweep", "subdir": "${torchvsa.folder:${hydra.job.override_dirname}}"},
+        "job": {"config": {"override_dirname": {"exclude_keys": ["workers", "fresh"]}}},
+        "job_logging": {"root": {"level": "WARNING"}},
+        "output_subdir": None,
+    }
+    OmegaConf.register_new_resolver("torchvsa.folder", folder_name, replace=True)
+    fields = [
+        ("defaults", list[Any], dataclasses.field(default_factory=lambda: list(defaults))),
+        ("hydra", Any, dataclasses.field(default_factory=lambda: dict(hydra_block))),
+    ]
+    return dataclasses.make_dataclass(study.settings.__name__, fields, bases=(study.settings,))
+
+
+def folder_name(overrides: str) -> str:
+    """A folder for what was overridden: the same for the same overrides, and readable as long as they are short."""
+    name = re.sub(r"[^A-Za-z0-9_.,=+-]+", "_", re.sub(r"[\[\]{}'\"]", "", overrides)).strip("_") or "default"
+    if len(name) > LONGEST_NAME or name != overrides:
+        digest = hashlib.sha256(overrides.encode()).hexdigest()[:8]
+        name = f"{name[:LONGEST_NAME]}-{digest}" if overrides else name
+    return name
+
+
+def _defaults(cls: type, package: str = "") -> Iterator[dict[str, Any]]:
+    for field in dataclasses.fields(cls):
+        path = f"{package}.{field.name}" if package else field.name
+        if "settings" in field.metadata:
+            yield from _defaults(field.metadata["settings"], path)
+        elif "group" in field.metadata:
+            group = field.metadata["group"]
+            yield {group if path == group else f"{group}@{path}": field.metadata["option"]}
+
+
+@contextmanager
+def errors_in_one_line(name: str) -> Iterator[None]:
+    """What the user can mend is told in one line on stderr, with exit status 1; an interrupt in one line with 130.
+
+    With HYDRA_FULL_ERROR=1 in the environment the whole traceback is shown instead.
+    """
+    os.environ["HYDRA_FULL_ERROR"] = "1"  # makes Hydra raise, instead of printing a report of several lines itself
+    try:
+        yield
+    except KeyboardInterrupt:
+        print(f"{name}: stopped; the same command goes on from here", file=sys.stderr)
+        sys.exit(130)
+    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError) as error:
+        if TRACEBACK_WANTED:
+            raise
+        print(f"{name}: {in_words(error)}", file=sys.stderr)
+        sys.exit(1)
+
+
+@contextmanager
+def ended_by_signals() -> Iterator[None]:
+    """SIGTERM and SIGHUP end this process as an exception does, so that its workers end with it."""
+
+    def end(number: int, frame: object) -> None:
+        print(f"ended by {signal.Signals(number).name}; the same command goes on from here", file=sys.stderr)
+        raise SystemExit(128 + number)
+
+    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+__all__ = ["errors_in_one_line", "option_name", "primary", "register", "run_study"]

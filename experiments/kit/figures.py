@@ -1,0 +1,105 @@
+"""The style of all figures, and curves of tidy frames with seaborn."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import matplotlib
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, which stay apart for colour-blind readers, and two that go with them.
+BLACK, ORANGE, SKY, GREEN = "#222222", "#E69F00", "#56B4E9", "#009E73"
+BLUE, VERMILION, PINK, GREY = "#0072B2", "#D55E00", "#CC79A7", "#8A949E"
+PURPLE, SLATE = "#7B5EA7", "#5B6875"
+PALETTE = (BLUE, VERMILION, GREEN, ORANGE, SKY, PINK, PURPLE, SLATE, BLACK, GREY)
+MARKERS = ("D", "v", "o", "^", "s", "P", "X", "d", "h", "*")
+
+Look = tuple[str, str]
+"""Colour and marker."""
+
+STYLE: Any = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.labelsize": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": "#5B6875",
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#E3E8EC",
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "xtick.labelsize": 8,
+    "ytick.labelsize": 8,
+    "hatch.linewidth": 0.6,
+}
+
+
+def png(figure: Figure, dpi: int = 120) -> bytes:
+    """A figure as the bytes of a PNG file; the same figure gives the same bytes."""
+    buffer = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        # Without the version of matplotlib, which it would write into the file.
+        figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
+    return buffer.getvalue()
+
+
+def looks(names: Sequence[str], fixed: Mapping[str, Look] | None = None) -> dict[str, Look]:
+    """A colour and a marker for each name: the `fixed` ones, and others in order for the rest."""
+    free = zip(PALETTE, MARKERS, strict=True)
+    found = dict(fixed or {})
+    taken = set(found.values())
+    rest = [look for look in free if look not in taken]
+    for name in names:
+        if name not in found:
+            found[name] = rest.pop(0) if rest else (GREY, "o")
+    return {name: found[name] for name in names}
+
+
+def lines(
+    axes: Axes,
+    frame: pd.DataFrame,
+    x: str,
+    y: str,
+    hue: str,
+    *,
+    order: Sequence[Any] | None = None,
+    low: str | None = None,
+    high: str | None = None,
+    fixed: Mapping[str, Look] | None = None,
+) -> None:
+    """Draw a line for each value of `hue`, in that `order` or the frame's; `low` and `high` are columns of a band.
+
+    Without those two, rows with the same x are repeats: the line is their median, the band lowest to highest.
+    """
+    import seaborn  # takes a second to load
+
+    names = [name for name in order or dict.fromkeys(frame[hue]) if (frame[hue] == name).any()]
+    chosen = looks(names, fixed)
+    colours = {name: look[0] for name, look in chosen.items()}
+    markers = {name: look[1] for name, look in chosen.items()}
+    seaborn.lineplot(
+        frame, x=x, y=y, hue=hue, style=hue, hue_order=names, style_order=names, palette=colours, markers=markers,
+        dashes=False, estimator="median", errorbar=None if low is not None else ("pi", 100), ax=axes, markersize=5.5,
+        markeredgewidth=0, linewidth=1.4, err_kws={"alpha": 0.15, "linewidth": 0},
+    )  # fmt: skip
+    if low is not None and high is not None:
+        for name in names:
+            own = frame.loc[frame[hue] == name].sort_values(by=x)
+            axes.fill_between(own[x], own[low], own[high], color=colours[name], alpha=0.15, linewidth=0)
+
+
+def legend_below(figure: Figure, axes: Axes, columns: int | None = None) -> None:
+    """One legend for the whole figure, below it, with the entries of one panel."""
+    handles, labels = axes.get_legend_handles_labels()
+    for panel in figure.axes:
+        if (legend := panel.get_legend()) is not None:
+            legend.remove()
+    names = [label.replace("_", " ") for label in labels]
+    figure.legend(handles, names, loc="outside lower center", ncols=columns or min(len(names), 5))

@@ -1,0 +1,46 @@
+"""Intervals at 95 %: Wilson's for one proportion, the bootstrap over what was drawn where there are several draws."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+LEVEL = 0.95
+
+
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson's interval (low, high) for a proportion. Raises `ValueError` unless 0 <= successes <= trials, trials > 0.
+
+    Source: Wilson 1927.
+    """
+    found = stats.binomtest(successes, trials).proportion_ci(LEVEL, method="wilson")
+    return float(found.low), float(found.high)
+
+
+def proportion(name: str, successes: int, trials: int) -> dict[str, Any]:
+    """Columns of a row: `{name}_rate`, `{name}_low` and `{name}_high`; None if there were no trials."""
+    columns = (f"{name}_rate", f"{name}_low", f"{name}_high")
+    if not trials:
+        return dict.fromkeys(columns)
+    return dict(zip(columns, (successes / trials, *wilson(successes, trials)), strict=True))
+
+
+def bootstrap(
+    values: Sequence[float], statistic: Callable[..., Any] = np.mean, seed: int = 0, draws: int = 2000
+) -> tuple[float, float]:
+    """The percentile interval (low, high) of a statistic over independent draws, e.g. codebooks, starts or folds.
+
+    One draw gives (NaN, NaN), since it says nothing about others. Source: Efron 1979.
+    """
+    sample = np.asarray(values, dtype=np.float64)
+    if not len(sample):
+        raise ValueError("an interval needs at least one value")
+    if len(sample) == 1:
+        return float("nan"), float("nan")
+    places = np.random.default_rng(seed).integers(0, len(sample), (draws, len(sample)))
+    found = np.array([statistic(row) for row in sample[places]])
+    low, high = np.quantile(found, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)

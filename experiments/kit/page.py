@@ -1,0 +1,145 @@
+"""A page that shows a study: sections of text, tables and figures in one HTML file that needs nothing else.
+
+>>> page = Page("Capacity", "How many pairs fit into one hypervector.")
+>>> section = page.section("Recall")
+>>> section.table(Table("Recall", [Column("k"), Column("recall")]).show([{"k": 10, "recall": 1.0}]))
+>>> "Recall" in page.html()
+True
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import jinja2
+import pandas as pd
+from markupsafe import Markup, escape
+from matplotlib import rc_context
+from matplotlib.figure import Figure
+
+from behaviours.storage import write_atomically
+from experiments.kit.columns import Column, Table
+from experiments.kit.figures import STYLE, png
+
+__all__ = ["Column", "Page", "Section", "Table"]
+
+_MIME = {b"\x89PNG": "image/png", b"GIF8": "image/gif"}
+
+
+@dataclass(frozen=True)
+class Block:
+    """One thing on the page: `kind` names how the template shows `content`."""
+
+    kind: str
+    content: object
+    caption: str = ""
+    alt: str = ""
+    data: str = ""
+
+
+@dataclass
+class Section:
+    """A part of the page under its own title; what is added to it appears in that order."""
+
+    title: str
+    page: Page
+    blocks: list[Block] = field(default_factory=list)
+
+    def text(self, *paragraphs: str) -> None:
+        """Add paragraphs. Plain text; what stands between backticks is shown as code."""
+        for paragraph in paragraphs:
+            self.blocks.append(Block("text", paragraph))
+
+    def table(self, table: Table) -> None:
+        """Add a table with its caption, and the definitions of its columns below it."""
+        self.blocks.append(Block("table", table, table.caption))
+        self.terms({column.title: column.about for column in table.columns if column.about})
+
+    def terms(self, definitions: Mapping[str, str]) -> None:
+        """Add a list of words and what each of them means."""
+        if definitions:
+            self.blocks.append(Block("terms", list(definitions.items())))
+
+    def picture(self, content: bytes, alt: str, caption: str = "", data: str = "") -> None:
+        """Add a PNG or a GIF (which plays); `alt` says in words what it shows. Raises `ValueError` for other bytes."""
+        mime = _MIME.get(content[:4])
+        if mime is None:
+            raise ValueError(f"picture {alt!r} starts with {content[:4]!r}; a page holds PNG and GIF only")
+        self.page.pictures += 1
+        image = self.page.pictures, f"data:{mime};base64,{base64.b64encode(content).decode()}"
+        self.blocks.append(Block("picture", image, caption, alt, data))
+
+    def figure(
+        self, name: str, draw: Callable[[], Figure], alt: str, caption: str = "", data: pd.DataFrame | None = None
+    ) -> None:
+        """Draw a figure, keep it as `figures/{name}.png`, with its `data` as CSV, and show both.
+
+        A figure that cannot be drawn costs nothing else: the page says why, and `page.failures` holds the traceback.
+        """
+        try:
+            with rc_context(STYLE):
+                content = png(draw())
+        except Exception as error:  # whatever it is, the results are worth more than one picture
+            self.page.failures[name] = traceback.format_exc()
+            self.text(f"The figure `{name}` could not be drawn: {type(error).__name__}: {error}")
+            return
+        table = "" if data is None else data.to_csv(index=False)
+        if self.page.folder is not None:
+            figures = self.page.folder / "figures"
+            figures.mkdir(exist_ok=True)
+            write_atomically(figures / f"{name}.png", content)
+            if table:
+                write_atomically(figures / f"{name}.csv", table.encode())
+        link = f"data:text/csv;base64,{base64.b64encode(table.encode()).decode()}" if table else ""
+        self.picture(content, alt, caption, link)
+
+    def code(self, text: str, caption: str = "") -> None:
+        """Add text to be copied: a command, settings."""
+        self.blocks.append(Block("code", text, caption))
+
+
+@dataclass
+class Page:
+    """The whole page; figures are kept in `folder` as well. The same content gives the same bytes."""
+
+    title: str
+    lead: str = ""
+    headline: str = ""
+    """The result in one sentence."""
+    folder: Path | None = None
+    sections: list[Section] = field(default_factory=list)
+    failures: dict[str, str] = field(default_factory=dict)
+    """The traceback of each figure that could not be drawn."""
+    pictures: int = 0
+
+    def section(self, title: str) -> Section:
+        """Begin a new section."""
+        section = Section(title, self)
+        self.sections.append(section)
+        return section
+
+    def html(self) -> str:
+        """The page as text; whatever was given is escaped."""
+        environment = jinja2.Environment(
+            loader=jinja2.FileSystemLoader(Path(__file__).parent),
+            autoescape=True,
+            undefined=jinja2.StrictUndefined,
+            trim_blocks=True,
+            lstrip_blocks=True,
+        )
+        environment.filters["inline"] = _inline
+        return environment.get_template("page.html").render(page=self)
+
+    def write(self, path: Path) -> Path:
+        """Write the page, whole or not at all."""
+        return write_atomically(path, self.html().encode())
+
+
+def _inline(text: str) -> Markup:
+    # Escaped first, so the only tags are those put in here.
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))

@@ -1,0 +1,111 @@
+"""Work spread over processes: joblib's, which end with the process that started them."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
+
+import joblib
+import numpy as np
+import torch
+from joblib.externals.loky import get_reusable_executor
+from joblib.parallel import get_active_backend
+from numpy.typing import NDArray
+
+Measure = Callable[[Any, Any], Any]
+
+
+def measured(measure: Measure, material: object, cells: Sequence[Any], workers: int) -> Iterator[tuple[int, Any]]:
+    """`measure(material, cell)` for each cell, with its place in `cells`, as they are done.
+
+    `workers` processes do the work, or those of `joblib.parallel_config`, if one is active. With one worker, and inside
+    a process of another pool (a sweep's), this process does all of it. Each works with one thread.
+    """
+    if workers == 1 or _nested():
+        yield from _here(measure, material, cells)
+        return
+    content = pickle.dumps((measure, material))
+    # joblib maps a large array into its workers' memory once, instead of sending it with each cell.
+    packed = np.frombuffer(content, dtype=np.uint8)
+    digest = hashlib.sha256(content).hexdigest()
+    tasks = (joblib.delayed(_there)(packed, digest, os.getpid(), place, cell) for place, cell in enumerate(cells))
+    pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", pre_dispatch="2*n_jobs")
+    yield from pool(tasks)
+
+
+def _nested() -> bool:
+    """Whether this is a process of another pool of joblib's."""
+    return bool(getattr(get_active_backend()[0], "nesting_level", 0))
+
+
+def _here(measure: Measure, material: object, cells: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    threads = torch.get_num_threads()
+    for place, cell in enumerate(cells):
+        torch.set_num_threads(1)
+        try:
+            found = measure(material, cell)
+        finally:
+            torch.set_num_threads(threads)
+        yield place, found
+
+
+def _there(packed: NDArray[np.uint8], digest: str, parent: int, place: int, cell: Any) -> tuple[int, Any]:
+    if os.getpid() != parent:  # joblib's backends of threads stay in this process
+        _end_with(os.getppid())
+    torch.set_num_threads(1)
+    measure, material = _unpacked(_Packed(packed, digest))
+    return place, measure(material, cell)
+
+
+class _Packed:
+    """Bytes that are compared by their digest."""
+
+    def __init__(self, content: NDArray[np.uint8], digest: str) -> None:
+        self.content, self.digest = content, digest
+
+    def __hash__(self) -> int:
+        return hash(self.digest)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Packed) and other.digest == self.digest
+
+
+@lru_cache(maxsize=1)
+def _unpacked(packed: _Packed) -> tuple[Measure, Any]:
+    """What this process's last cells worked with, unpacked once."""
+    return pickle.loads(packed.content.tobytes())
+
+
+@lru_cache(maxsize=1)
+def _end_with(parent: int) -> None:
+    """End this process when its parent is gone: a killed parent cannot end it."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Executor | None]:
+    """A pool of `workers` processes of one thread each, for `sim.rollout`; None where this process works alone."""
+    if workers == 1 or _nested():
+        yield None
+        return
+    # Those of an earlier call are used again.
+    yield get_reusable_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
+
+
+def _begin(parent: int) -> None:
+    torch.set_num_threads(1)
+    _end_with(parent)

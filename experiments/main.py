@@ -1,0 +1,50 @@
+"""The command `torchvsa`: a study by its name, and the page of a finished run drawn again."""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+import experiments.studies  # noqa: F401  (registers them)
+from experiments.kit import STUDIES
+from experiments.kit.command import errors_in_one_line, run_study
+from experiments.kit.run import draw, load
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run `torchvsa STUDY [setting=value ...]` or `torchvsa draw FOLDER`."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    if not given or given[0] in ("--help", "-h"):
+        print_commands(Console())
+        return
+    name, rest = given[0], given[1:]
+    if name == "draw":
+        draw_again(rest)
+        return
+    with errors_in_one_line("torchvsa"):
+        study = STUDIES.find(name)
+    run_study(study, rest)
+
+
+def draw_again(arguments: Sequence[str]) -> None:
+    """Draw the pages of finished runs again, from their results."""
+    with errors_in_one_line("torchvsa draw"):
+        if not arguments:
+            raise ValueError("which folder? give one that holds results.json")
+        for argument in arguments:
+            study, outcome = load(Path(argument))
+            draw(study, outcome, Console())
+            print(outcome.folder / "report.html")
+
+
+def print_commands(console: Console) -> None:
+    """What can be run."""
+    table = Table(title="torchvsa COMMAND [setting=value ...]; COMMAND --help lists its settings", box=None)
+    table.add_column("command", no_wrap=True)
+    table.add_column("what it answers or does")
+    for name, study in STUDIES.items():
+        table.add_row(name, study.about)
+    table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
+    console.print(table)

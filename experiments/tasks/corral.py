@@ -1,0 +1,143 @@
+"""The corral as a task: its settings, what a learner is told about the robot, and runs of its teacher."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.progress import Progress
+
+import sim
+from behaviours import Actuator, Demonstrations, Schema, Sensor, Space
+from experiments.kit import Part, Settings, part, parts, setting
+from experiments.kit.intervals import proportion
+from experiments.kit.options import GROUPS, Group
+from experiments.kit.pool import processes
+
+COMMAND_LEVELS = 3
+"""Levels that a learner tells apart on each wheel: backward, stop, forward."""
+
+FIRST_DEMONSTRATION = 1_000_000
+FIRST_VALIDATION = 2_000_000
+"""Held-out starts are the episodes 0, 1, ...; those to learn from and to choose settings with lie far away."""
+
+GROUPS["arena"] = Group(sim.ARENAS)
+
+
+@dataclass
+class Driving(Settings):
+    """How robots are driven."""
+
+    body: str = setting("planar", "the robot's body", choices=lambda: sim.BODIES)
+    seconds: float = setting(60.0, "longest duration of an episode, s", above=0)
+    robots: int = setting(64, "robots per process, about 29 MB each", low=1)
+
+
+@dataclass
+class Learning(Driving):
+    """What a program is made with, and where it drives."""
+
+    vsa: Part = part("vsa", "map_c", "the architecture")
+    encoder: Part = part("encoder", "level", "the code of one reading")
+    record: Part = part("record", "product", "how the codes of all sensors become a condition")
+    protection: Part = part("protection", "none", "what is done to a condition before it is bound")
+    rule: Part = part("rule", "error_driven", "how a program is learned")
+    arena: Part = part("arena", "default", "the corral")
+
+
+def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
+    """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
+    return Schema(
+        [Sensor(channel.name, channel.low, channel.high, channel.unit, out_of_range) for channel in sim.SENSORS],
+        [
+            Actuator(channel.name, channel.low, channel.high, channel.unit, levels=COMMAND_LEVELS)
+            for channel in sim.ACTUATORS
+        ],
+    )
+
+
+def space(settings: Any, vsa: parts.Options | None = None, bins: int | None = None) -> Space:
+    """Codebooks for the groups `encoder`, `record` and `protection` of these settings.
+
+    `vsa` is needed where they do not choose one; `bins` replaces those of the encoder.
+    """
+    encoder = settings.encoder if bins is None else {**settings.encoder, "bins": bins}
+    return parts.space(schema(), vsa or settings.vsa, encoder, settings.record, settings.protection, settings.seed)
+
+
+def arena(options: parts.Options) -> sim.Arena:
+    """The arena of the group `arena`."""
+    return sim.Arena(**{key: value for key, value in options.items() if key != "name"})
+
+
+def drive(
+    settings: Driving,
+    policy: sim.ControllerLike,
+    episodes: Iterable[int],
+    arena: str | sim.Arena = "default",
+    body: str | None = None,
+    record: bool = False,
+) -> sim.Rollout:
+    """Drive in this process, as a cell does."""
+    return sim.rollout(
+        policy, arena, body or settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
+        record=record,
+    )  # fmt: skip
+
+
+def drive_together(
+    settings: Driving,
+    what: str,
+    policy: sim.ControllerLike,
+    episodes: range,
+    progress: Progress,
+    arena: str | sim.Arena = "default",
+) -> sim.Rollout:
+    """Drive on all workers, recorded, with a progress bar: the same bits as in one process."""
+    task = progress.add_task(what, total=len(episodes))
+    with processes(settings.workers) as executor:
+        return sim.rollout(
+            policy, arena, settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
+            executor=executor, workers=1 if executor is None else settings.workers,
+            progress=lambda count: progress.advance(task, count),
+        )  # fmt: skip
+
+
+def shown_in(rollout: sim.Rollout) -> tuple[Demonstrations, NDArray[np.bool_]]:
+    """The control steps of a recorded rollout as a demonstration, and which of them came before the lamp."""
+    steps = rollout.trajectory
+    return Demonstrations(steps.sensors, steps.commands, rollout.step_episode), ~steps.reached
+
+
+def moving(rollout: sim.Rollout) -> Demonstrations:
+    """The control steps before the lamp: a robot at rest repeats one condition and would flatter every learner."""
+    shown, before = shown_in(rollout)
+    return shown.where(before.tolist())
+
+
+def from_file(path: str | Path) -> Demonstrations:
+    """Demonstrations that were saved with `Demonstrations.save`; raises unless they fit the corral robot."""
+    try:
+        demonstrations = Demonstrations.load(path)
+        demonstrations.check(schema(out_of_range="error"))
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from error
+    return demonstrations
+
+
+def driven(rollout: sim.Rollout) -> dict[str, Any]:
+    """Numbers of a rollout that can be pooled: `episodes`, `successes` and `escapes`."""
+    return {
+        "episodes": len(rollout),
+        "successes": int(rollout.success.sum()),
+        "escapes": int(rollout.escaped.sum()),
+    }
+
+
+def success(episodes: int, successes: int) -> dict[str, Any]:
+    """Success over all episodes with Wilson's 95 % interval, as columns of a row; None for no episode."""
+    return {"episodes": int(episodes), **proportion("success", int(successes), int(episodes))}
