@@ -41,7 +41,7 @@ def draw_again(arguments: Sequence[str]) -> None:
 
 def print_commands(console: Console) -> None:
     """What can be run."""
-    table = Table(title="torchvsa COMMAND [setting=value ...]; COMMAND --help lists its settings", box=None)
+    table = Table(title="torchvsa COMMAND setting=value ...; COMMAND --help lists its settings", box=None)
     table.add_column("command", no_wrap=True)
     table.add_column("what it answers or does")
     for name, study in STUDIES.items():

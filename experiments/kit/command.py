@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import dataclasses
 import hashlib
 import os
@@ -32,6 +33,10 @@ TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 """Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
 
 LONGEST_NAME = 80
+
+# Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a default
+# must stay the object that `dataclasses` compares with.
+copyreg.pickle(type(dataclasses.MISSING), lambda missing: "MISSING")
 
 
 def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import difflib
 import re
 
-from hydra.errors import HydraException
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException, ValidationError
 
-KINDS = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false", "String": "a text"}
+KINDS = {"Integer": "a whole number", "Float": "a number", "bool": "true or false", "String": "a text"}
 
 
 def in_words(error: BaseException) -> str:
@@ -19,20 +18,35 @@ def in_words(error: BaseException) -> str:
             return _of_omegaconf(cause)
         cause = cause.__cause__
     text = " ".join(str(error).split())
-    if isinstance(error, HydraException):
-        text = text.replace(" To append to your config use +", "; to add it, write +")
+    if found := re.search(
+        r"Could not find '([\w/]+)/([^'/]+)' Available options in '[\w/]+': (.*?) Config search", text
+    ):
+        group, option, options = found.groups()
+        return f"there is no {group} {option!r}; choose from {', '.join(options.split())}"
+    if found := re.search(r"Could not find 'experiment/([^']+)'", text):
+        return f"there is no experiment {found[1]!r}; this study has no presets"
+    if found := re.search(r"Ambiguous value for argument '(.*?)=(.*?)' 1\.", text):
+        return f"{found[1]}={found[2]}: a list needs brackets, {found[1]}=[{found[2]}]; a job for each needs --multirun"
+    if found := re.search(r"Multiple values for (\w+)\.", text):
+        return f"write {found[1]}=... without +"
     return text or type(error).__name__
 
 
 def _of_omegaconf(error: OmegaConfBaseException) -> str:
-    key = error.full_key or ""
+    key, text = error.full_key or "", " ".join(str(error).split())
     if isinstance(error, ConfigKeyError | ConfigAttributeError):
-        known = [str(name) for name in error.parent_node or ()] if error.parent_node is not None else []  # pyright: ignore[reportGeneralTypeIssues]
-        near = difflib.get_close_matches(str(error.key), known, 1)
-        hint = f"did you mean {near[0]}?" if near else f"choose from {', '.join(known)}"
+        if key == "experiment":
+            return "this study has no presets, so that there is no experiment to choose"
+        parent, _, name = key.rpartition(".")
+        known = [] if error.parent_node is None else [str(one) for one in error.parent_node if one != "hydra"]  # pyright: ignore[reportGeneralTypeIssues]
+        near = difflib.get_close_matches(name, known, 1)
+        hint = f"did you mean {parent}.{near[0]}?".replace(" .", " ") if near else f"choose from {', '.join(known)}"
         return f"there is no setting {key!r}; {hint}"
-    if isinstance(error, ValidationError) and (found := re.search(r"Value '(.*)' .* converted to (\w+)", str(error))):
-        return f"{key}={found[1]}: expected {KINDS.get(found[2], found[2])}"
-    if isinstance(error, ValidationError) and "ListConfig" in str(error):
-        return f"{key}: expected a list, e.g. {key}=[a,b]"
-    return f"{key}: {' '.join(str(error.msg or error).split())}" if key else " ".join(str(error).split())
+    if isinstance(error, ValidationError):
+        if "ListConfig" in text:
+            return f"{key}: expected a list, e.g. {key}=[a,b]"
+        if found := re.search(
+            r"Value '(.*?)' (?:of type '.*?' could not be converted to (\w+)|is not a valid (\w+))", text
+        ):
+            return f"{key}={found[1]}: expected {KINDS.get(found[2] or found[3], found[2] or found[3])}"
+    return f"{key}: {' '.join(str(error.msg or error).split())}" if key else text

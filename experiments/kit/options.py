@@ -15,9 +15,12 @@ from pathlib import Path
 from typing import Any, Literal, Optional, Union, get_args, get_origin
 
 import torch
+import yaml
 from hydra.core.config_store import ConfigStore
 
 from behaviours import POLICIES, RULES
+from experiments.kit.meanings import MEANINGS
+from experiments.kit.settings import written
 from torchvsa import ARCHITECTURES, PROTECTIONS
 from torchvsa.encoders import ENCODERS, VALUE_ENCODERS
 from torchvsa.registry import Registry
@@ -35,12 +38,14 @@ class Group:
             option's name has `_` for `-` and small letters.
         given: parameters that the run supplies, so that no setting does.
         defaults: values for parameters without a default.
+        meanings: of settings, by name, beside those in `kit.meanings`.
         only: whether a part is an option; all are by default.
     """
 
     parts: Registry[Any] | Mapping[str, Any]
     given: frozenset[str] = frozenset()
     defaults: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    meanings: Mapping[str, str] = dataclasses.field(default_factory=dict)
     only: Callable[[Any], bool] = lambda part: True
 
 
@@ -75,6 +80,20 @@ def options(group: str) -> list[str]:
     parts = [option_name(name) for name, part in found.parts.items() if found.only(part)]
     presets = sorted(path.stem for path in (CONFIGS / group).glob("*.yaml"))
     return list(dict.fromkeys([*parts, *presets]))
+
+
+def described_option(group: str, option: str) -> list[tuple[str, str, str]]:
+    """The settings of an option, but for its name: name, default and meaning."""
+    found, path, changed = GROUPS[group], CONFIGS / group / f"{option}.yaml", {}
+    if path.is_file():
+        changed = yaml.safe_load(path.read_text())
+        (schema,) = changed.pop("defaults")
+        option = schema.rpartition("/")[2].partition("@")[0]
+    (name,) = (name for name in found.parts if option_name(name) == option)
+    defaults = {field.name: field.default for field in dataclasses.fields(typed(name, found.parts[name], found))}
+    meanings = {**MEANINGS, **found.meanings}
+    values = {**defaults, **changed}
+    return [(key, written(value), meanings.get(key, "")) for key, value in values.items() if key != "name"]
 
 
 def register_groups() -> None:

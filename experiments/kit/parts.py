@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
@@ -27,6 +28,7 @@ def space(
     command_codes: str = "lookup",
 ) -> Space:
     """Codebooks for the options of these groups; `command_codes` names the value encoder of the actuators' levels."""
+    known_only("vsa", vsa, torchvsa.ARCHITECTURES.find(vsa["name"]))
     algebra = torchvsa.architecture(**vsa)
     levels = max(actuator.levels for actuator in schema.actuators)
     return Space(
@@ -43,25 +45,25 @@ def conditions(vsa: VSA, sensors: int, encoder: Options, record: Options) -> Enc
 
     One that does both at once has the `bins` of `encoder`, if it has bins.
     """
+    if (bins := encoder.get("bins", 2)) < 2:
+        raise ValueError(f"encoder.bins={bins}: expected 2 or more; with fewer all readings are one condition")
     made = ENCODERS.find(record["name"])
-    options = {key: value for key, value in record.items() if key != "name"}
     if takes(made, "values"):
-        kind = VALUE_ENCODERS.find(encoder["name"])
-        values = kind(vsa, **{key: value for key, value in encoder.items() if key != "name"})
-        return made(values, sensors, **options)
+        values = _made("encoder", VALUE_ENCODERS, encoder, vsa)
+        return _made("record", ENCODERS, record, values, sensors)
     if takes(made, "bins"):
-        options["bins"] = encoder.get("bins", 32)
-    return made(vsa, sensors, **options)
+        record = {**record, "bins": encoder.get("bins", 32)}
+    return _made("record", ENCODERS, record, vsa, sensors)
 
 
 def rule(options: Options) -> Rule:
     """The learning rule of the group `rule`."""
-    return _made(RULES, options)
+    return _made("rule", RULES, options)
 
 
 def policy(bank: BehaviourBank, options: Options) -> Policy:
     """The policy of the group `composition`, over all behaviours of a bank."""
-    return _made(POLICIES, options, bank)
+    return _made("composition", POLICIES, options, bank)
 
 
 def refuse_unsupported(rule: Rule, space: Space) -> None:
@@ -70,6 +72,14 @@ def refuse_unsupported(rule: Rule, space: Space) -> None:
         raise ValueError(f"the rule {rule.name} cannot train programs of {space.vsa.name}; choose another rule or vsa")
 
 
-def _made(registry: Registry[Callable[..., T]], options: Options, *arguments: Any) -> T:
-    given = dict(options)
-    return registry.find(given.pop("name"))(*arguments, **given)
+def known_only(group: str, options: Options, part: Callable[..., object]) -> None:
+    """Raise `ValueError` for an option that a part does not take; Hydra lets such be added with `+`."""
+    names = [name for name in inspect.signature(part).parameters if name in options]
+    if unknown := [name for name in options if name not in ("name", *names)]:
+        raise ValueError(f"there is no setting '{group}.{unknown[0]}'; {options['name']} takes {', '.join(names)}")
+
+
+def _made(group: str, registry: Registry[Callable[..., T]], options: Options, *arguments: Any) -> T:
+    made = registry.find(options["name"])
+    known_only(group, options, made)
+    return made(*arguments, **{key: value for key, value in options.items() if key != "name"})

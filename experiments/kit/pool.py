@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from functools import lru_cache
 from typing import Any
 
+import cloudpickle
 import joblib
 import numpy as np
 import torch
@@ -32,13 +33,20 @@ def measured(measure: Measure, material: object, cells: Sequence[Any], workers: 
     if workers == 1 or _nested():
         yield from _here(measure, material, cells)
         return
-    content = pickle.dumps((measure, material))
+    content = cloudpickle.dumps((measure, material))
     # joblib maps a large array into its workers' memory once, instead of sending it with each cell.
     packed = np.frombuffer(content, dtype=np.uint8)
     digest = hashlib.sha256(content).hexdigest()
-    tasks = (joblib.delayed(_there)(packed, digest, os.getpid(), place, cell) for place, cell in enumerate(cells))
-    pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", pre_dispatch="2*n_jobs")
+    tasks = (joblib.delayed(_there)(packed, digest, place, cell) for place, cell in enumerate(cells))
+    # Workers of a cluster have other parents.
+    watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _backend() == "LokyBackend" else {}
+    pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", **watched)
     yield from pool(tasks)
+
+
+def _backend() -> str:
+    """The name of the backend that joblib would use."""
+    return type(get_active_backend()[0]).__name__
 
 
 def _nested() -> bool:
@@ -57,9 +65,7 @@ def _here(measure: Measure, material: object, cells: Sequence[Any]) -> Iterator[
         yield place, found
 
 
-def _there(packed: NDArray[np.uint8], digest: str, parent: int, place: int, cell: Any) -> tuple[int, Any]:
-    if os.getpid() != parent:  # joblib's backends of threads stay in this process
-        _end_with(os.getppid())
+def _there(packed: NDArray[np.uint8], digest: str, place: int, cell: Any) -> tuple[int, Any]:
     torch.set_num_threads(1)
     measure, material = _unpacked(_Packed(packed, digest))
     return place, measure(material, cell)
@@ -84,18 +90,6 @@ def _unpacked(packed: _Packed) -> tuple[Measure, Any]:
     return pickle.loads(packed.content.tobytes())
 
 
-@lru_cache(maxsize=1)
-def _end_with(parent: int) -> None:
-    """End this process when its parent is gone: a killed parent cannot end it."""
-
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
 @contextmanager
 def processes(workers: int) -> Iterator[Executor | None]:
     """A pool of `workers` processes of one thread each, for `sim.rollout`; None where this process works alone."""
@@ -107,5 +101,12 @@ def processes(workers: int) -> Iterator[Executor | None]:
 
 
 def _begin(parent: int) -> None:
+    """What a worker does first: use one thread, and watch its parent, which cannot end it if it is killed itself."""
     torch.set_num_threads(1)
-    _end_with(parent)
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()

@@ -28,7 +28,7 @@ def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
     config = config_of(settings)
     if not settings.fresh and finished(folder, study, config):
         console.print(f"{folder} holds the results of these settings; fresh=true begins anew", soft_wrap=True)
-        return load(folder)[1]
+        return load(folder, study)[1]
     folder.mkdir(parents=True, exist_ok=True)
     cells = study.cells(settings)
     kept = store.Cells(folder, study.name, config, settings.fresh)
@@ -100,10 +100,10 @@ def finished(folder: Path, study: Study, config: dict[str, Any]) -> bool:
     return made == (study.name, torchvsa.__version__, store.plain(store.relevant(config)))
 
 
-def load(folder: Path) -> tuple[Study, Outcome]:
-    """A study and what it found, from the folder of a finished run."""
+def load(folder: Path, study: Study | None = None) -> tuple[Study, Outcome]:
+    """A study, by default the registered one, and what it found, from the folder of a finished run."""
     content = json.loads((folder / "results.json").read_text())
-    study = STUDIES.find(content["study"])
+    study = study or STUDIES.find(content["study"])
     settings = settings_of(study, content["config"])
     records = pd.read_parquet(folder / "records.parquet")
     found = (content[key] for key in ("config", "table", "metrics", "provenance"))

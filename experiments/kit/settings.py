@@ -13,6 +13,7 @@ Hydra checks names and types; `check` checks the rest. `--help` and the docs sho
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -98,7 +99,7 @@ def described(cls: type, prefix: str = "") -> Iterator[Described]:
             yield Described(name, str(metadata["option"]), metadata["about"], f"an option of {metadata['group']}")
         else:
             default = field.default if field.default is not dataclasses.MISSING else field.default_factory()  # pyright: ignore[reportCallIssue]
-            yield Described(name, _plain(default), metadata["about"], _expected(metadata["allowed"]))
+            yield Described(name, written(default), metadata["about"], _allowed(metadata["allowed"]))
 
 
 def check(given: object, prefix: str = "") -> None:
@@ -121,7 +122,7 @@ def _check(name: str, value: object, metadata: Mapping[str, Any]) -> None:
         if choices is not None and entry not in choices:
             raise ValueError(f"{name}: there is no {entry!r}; choose from {', '.join(map(str, choices))}")
         if isinstance(entry, int | float) and not _within(entry, allowed):
-            raise ValueError(f"{name}={_plain(value)}: expected {_expected(allowed)}")
+            raise ValueError(f"{name}={written(value)}: expected {_expected(allowed)}")
     if not isinstance(value, list):
         return
     if metadata["distinct"]:
@@ -135,7 +136,7 @@ def _check(name: str, value: object, metadata: Mapping[str, Any]) -> None:
 
 def _within(number: float, allowed: Mapping[str, Any]) -> bool:
     low, high, above, below = (allowed[end] for end in ("low", "high", "above", "below"))
-    return (
+    return math.isfinite(number) and (
         (low is None or number >= low)
         and (high is None or number <= high)
         and (above is None or number > above)
@@ -154,17 +155,25 @@ def _expected(allowed: Mapping[str, Any]) -> str:
     words += [f"more than {above:g}"] if above is not None else []
     words += [f"at most {high:g}"] if high is not None else []
     words += [f"less than {below:g}"] if below is not None else []
-    return " and ".join(words)
+    return " and ".join(words) or "a finite number"
+
+
+def _allowed(allowed: Mapping[str, Any]) -> str:
+    """What is allowed, for people; empty where the type says it all."""
+    words = _expected(allowed)
+    return "" if words == "a finite number" else words
 
 
 def _listed(choices: Choices) -> list[object]:
     return list(choices() if callable(choices) else choices)
 
 
-def _plain(value: object) -> str:
+def written(value: object) -> str:
     """A value as one writes it on the command line."""
     if isinstance(value, list):
-        return f"[{','.join(map(_plain, value))}]"
+        return f"[{','.join(map(written, value))}]"
+    if isinstance(value, dict):
+        return f"{{{','.join(map(str, value))}}}"
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -25,7 +25,22 @@ FIRST_DEMONSTRATION = 1_000_000
 FIRST_VALIDATION = 2_000_000
 """Held-out starts are the episodes 0, 1, ...; those to learn from and to choose settings with lie far away."""
 
-GROUPS["arena"] = Group(sim.ARENAS)
+GROUPS["arena"] = Group(
+    sim.ARENAS,
+    meanings={
+        "side": "inner edge length of the corral, m",
+        "gap": "width of the opening, m",
+        "gap_offset": "y of the opening's middle, m",
+        "lamp_beyond": "distance from the wall with the gap to the lamp, m",
+        "lamp_offset": "y of the lamp relative to the opening's middle, m",
+        "lamp_radius": "m",
+        "lamp_height": "m; below the sensors",
+        "wall_height": "m; above the sensors",
+        "wall_thickness": "m",
+        "start_margin": "smallest distance from a start to a wall, m",
+        "wheel_noise": "standard deviation of a wheel's speed, as a share of the commanded speed",
+    },
+)
 
 
 @dataclass
@@ -71,6 +86,7 @@ def space(settings: Any, vsa: parts.Options | None = None, bins: int | None = No
 
 def arena(options: parts.Options) -> sim.Arena:
     """The arena of the group `arena`."""
+    parts.known_only("arena", options, sim.Arena)
     return sim.Arena(**{key: value for key, value in options.items() if key != "name"})
 
 

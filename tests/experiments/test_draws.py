@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from experiments.models.draws import AHEAD, Draw
 from experiments.models import draws
+from experiments.models.draws import AHEAD, Draw
 from sim.state import join, rows_of
 
 SEEDS = [(5, 1), (5, 9), (2, 1)]

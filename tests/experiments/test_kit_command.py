@@ -1,0 +1,179 @@
+"""A study as a command: one line for what the user can mend, sweeps, and no process left behind."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from commands import only, results
+from counting import study
+
+from experiments.kit.command import run_study
+from experiments.main import main
+
+COUNTING = Path(__file__).with_name("counting.py")
+
+
+def command(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "OMP_NUM_THREADS": "1", "PYTHONPATH": str(Path(__file__).parents[2])}
+    return subprocess.Popen(
+        [sys.executable, COUNTING, *arguments], cwd=folder, env=environment, stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+@pytest.fixture
+def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., str]:
+    """`refused(*arguments)`: the one line with which the command refuses them."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command changes
+    monkeypatch.setattr(sys, "argv", ["torchvsa"])
+
+    def line(*arguments: str) -> str:
+        with pytest.raises(SystemExit) as exit_:
+            run_study(study, arguments)
+        assert exit_.value.code == 1
+        (found,) = capsys.readouterr().err.splitlines()
+        assert not list(tmp_path.rglob("results.json"))
+        return found
+
+    return line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ("repeats=abc", "repeats=abc: expected a whole number"),
+        ("repeats=1e3", "repeats=1000.0: expected a whole number"),
+        ("repeats=", "repeats=: expected a whole number"),
+        ("share=x", "share=x: expected a number"),
+        ("drawable=maybe", "drawable=maybe: expected true or false"),
+        ("names=a", "names: expected a list, e.g. names=[a,b]"),
+        ("repeats=1,2", "a list needs brackets, repeats=[1,2]; a job for each needs --multirun"),
+        ("repaets=1", "there is no setting 'repaets'; did you mean repeats?"),
+        ("zzz=1", "there is no setting 'zzz'; choose from seed, workers, fresh, rule"),
+        ("rule=nonsense", "there is no rule 'nonsense'; choose from error_driven, gradient, "),
+        ("rule.epoch=3", "there is no setting 'rule.epoch'; did you mean rule.epochs?"),
+        ("experiment=nonsense", "there is no experiment 'nonsense'; choose from printed, quick"),
+        ("+experiment=quick", "experiment"),
+        ("hydra/launcher=nonsense", "there is no hydra/launcher 'nonsense'; choose from basic, joblib"),
+        ("hydra.run.dir=/dev/null/results", "/dev/null/results"),
+        ("+hydra.callbacks.x._target_=os.system", "could run code"),
+        ("hydra.launcher._target_=os.system", "could run code"),
+        ("+hydra.job_logging.handlers.x.class=os.system", "of Python's logging, settings change nothing but levels"),
+        ("hydra.searchpath=[pkg://os]", "could run code"),
+        ("--config-name=other", "a study has its own config"),
+        ("--config-dir=mine", "mine/experiment/evil.yaml: _target_ could run code"),
+    ],
+)
+def test_one_line_names_what_is_wrong(refused: Callable[..., str], tmp_path: Path, arguments: str, words: str) -> None:
+    (tmp_path / "mine" / "experiment").mkdir(parents=True)
+    (tmp_path / "mine" / "experiment" / "evil.yaml").write_text("hydra: {launcher: {_target_: os.system}}\n")
+    line = refused(*arguments.split())
+    assert line.startswith("counting: ")
+    assert words in line
+
+
+def test_presets_of_the_users_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", ["torchvsa"])
+    (tmp_path / "mine" / "experiment").mkdir(parents=True)
+    (tmp_path / "mine" / "experiment" / "tiny.yaml").write_text("# @package _global_\nnames: [c]\nrepeats: 1\n")
+    run_study(study, ["--config-dir", "mine", "experiment=tiny", "workers=1"])
+    assert results(tmp_path)["config"]["names"] == ["c"]
+
+
+def test_help_lists_settings_options_and_presets(capsys: pytest.CaptureFixture[str]) -> None:
+    run_study(study, ["--help"])
+    printed = capsys.readouterr().out
+    for words in ("what is counted", "a, b, c", "a number from 1 to 100", "error_driven", "margin", "experiment=quick"):
+        assert words in printed
+
+
+def test_the_main_command_lists_studies_and_names_what_is_not_there(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    main([])
+    printed = capsys.readouterr().out
+    assert "capacity" in printed
+    assert "draw FOLDER" in printed
+    for arguments, words in ((["nonsense"], "no study 'nonsense'"), (["draw"], "which folder?"), (["draw", "x"], "x")):
+        with pytest.raises(SystemExit) as exit_:
+            main(arguments)
+        assert exit_.value.code == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert words in line
+
+
+@pytest.mark.slow
+def test_a_sweep_of_four_jobs_two_at_a_time_and_again(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    arguments = (
+        "--multirun", "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "seed=0,1,2,3", "repeats=1",
+        f"log={log}", "workers=2", "seconds=0.5",
+    )  # fmt: skip
+    sweep = command(tmp_path, *arguments)
+    _, said = sweep.communicate(timeout=300)
+    assert sweep.returncode == 0, said
+    found = [json.loads(path.read_text()) for path in tmp_path.rglob("results.json")]
+    assert sorted(content["seed"] for content in found) == [0, 1, 2, 3]
+    lines = log.read_text().split()
+    assert len(lines[::2]) == 8
+    assert len(set(lines[1::2])) == 2  # processes
+    again = command(tmp_path, *arguments)
+    assert again.wait(300) == 0
+    assert log.read_text().split() == lines
+
+
+def running(pid: int) -> bool:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("number", "code", "words"),
+    [
+        (signal.SIGTERM, 143, "SIGTERM; the same command goes on from here"),
+        (signal.SIGHUP, 129, "SIGHUP; the same command goes on from here"),
+        (signal.SIGKILL, -9, ""),
+        (signal.SIGINT, 130, "counting: stopped; the same command goes on from here"),
+    ],
+)
+def test_no_worker_outlives_the_command_and_the_same_command_goes_on(
+    tmp_path: Path, number: signal.Signals, code: int, words: str
+) -> None:
+    log = tmp_path / "log"
+    arguments = (f"log={log}", "repeats=16", "seconds=0.3", "names=[a]")
+    run = command(tmp_path, *arguments)
+    deadline = time.monotonic() + 120
+    while not log.exists() or len(log.read_text().splitlines()) < 5:
+        assert time.monotonic() < deadline, "no cell was measured"
+        time.sleep(0.1)
+    workers = {int(line.split()[1]) for line in log.read_text().splitlines()}
+    assert len(workers) == 2
+    if number == signal.SIGINT:  # as a terminal sends it: to the whole group
+        os.killpg(run.pid, number)
+    else:
+        os.kill(run.pid, number)
+    assert run.wait(60) == code
+    assert words in run.communicate()[1]
+    deadline = time.monotonic() + 20
+    while any(map(running, workers)):
+        assert time.monotonic() < deadline, "a worker is left"
+        time.sleep(0.1)
+    done = len(only(tmp_path, "cells.jsonl").read_text().splitlines())
+    assert 0 < done < 16
+    log.unlink()
+    again = command(tmp_path, *arguments)
+    assert again.wait(120) == 0
+    assert f"{done} of 16 cells" in again.communicate()[0]
+    assert len(log.read_text().splitlines()) == 16 - done
