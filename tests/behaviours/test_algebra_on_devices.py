@@ -34,13 +34,15 @@ def check_strictness() -> None:
     away[here[:2]] += 1
     assert other().brought_back(away).tolist() == [1, 2, 2, 3]
     waits: list[Callable[[], Any]] = [away.sum().item, away.cpu, away.tolist, away.unique, lambda: away[away > 1]]
+    waits += [lambda: torch.tensor([1, 2], device=other().NAME), lambda: away[[0, 1]]]
     for wait in waits:
         other().waited.clear()
         wait()
         assert other().waited
     other().waited.clear()
-    assert other().brought_back(away.to(torch.int8).clamp(0, 1)[away]).tolist() == [1, 1, 1, 1]
+    looked_up = away.to(torch.int8).clamp(0, 1)[away]
     assert other().waited == []
+    assert other().brought_back(looked_up).tolist() == [1, 1, 1, 1]
 
 
 @pytest.mark.parametrize("rows", [3, 200])
