@@ -20,7 +20,7 @@ def main() -> None:
     """Measure and print the table; a whole run writes `results.json` and draws it into `docs/` too."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside peers.")
     parser.add_argument("--only", nargs="+", choices=[*WORKS, GROWTH], help="print these works alone")
-    parser.add_argument("--threads", nargs="+", type=int, default=[1, 2])
+    parser.add_argument("--threads", nargs="+", type=int, help="1 and 2 by default; on a GPU, which has its own, 1")
     parser.add_argument("--repeats", type=int, default=7, help="timed runs of each call, after one to warm up")
     parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")
     parser.add_argument("--small", action="store_true", help="print tiny sizes, to see that all works")
@@ -28,6 +28,7 @@ def main() -> None:
     parser.add_argument("--docs", type=Path, help="fill benchmarks.md here, and draw; a whole run does, in docs/")
     options = parser.parse_args()
     on_cpu = options.device == "cpu"
+    options.threads = options.threads or ([1, 2] if on_cpu else [1])
     if not (on_cpu or torch.cuda.is_available()):
         parser.error("PyTorch finds no CUDA device here; leave out --device cuda")
     suffix, whole = "" if on_cpu else f"_{options.device}", not (options.only or options.small)

@@ -32,12 +32,17 @@ class Bundle(Policy):
             to which float64 represents all integers, or that are so small that their squares underflow.
     """
 
+    _weights: Tensor
+
     def __init__(self, bank: BehaviourBank, weights: Mapping[str, float] | None = None) -> None:
         super().__init__(bank, bank.names)
         self.weights = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
         """One weight per name."""
         if not any(self.weights):
             raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
+        # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.
+        row = torch.tensor(self.weights, dtype=torch.float64, device=self.space.device)
+        self.register_buffer("_weights", row, persistent=False)
         self.behaviour = Behaviour.sum(self.parts, self.weights)
         """The sum as a behaviour."""
 
@@ -53,8 +58,7 @@ class Bundle(Policy):
         match = readout.match(conditions)
         # The score of a result is the weighted sum of its scores for each behaviour.
         parts = readout.of(stack_programs([part.program for part in self.parts]))(conditions)
-        weights = torch.tensor(self.weights, dtype=torch.float64, device=parts.device)
-        winner = match.index[:, None, None].expand(-1, len(weights), 1)
-        shares = (weights * parts.gather(-1, winner)[..., 0]).masked_fill(weights == 0, -torch.inf)
+        winner = match.index[:, None, None].expand(-1, len(self.weights), 1)
+        shares = (self._weights * parts.gather(-1, winner)[..., 0]).masked_fill(self._weights == 0, -torch.inf)
         familiar = familiarity(conditions, whole.known)
         return Recall(whole.memory.commands[match.index], match.similarity, match.margin, familiar, shares.argmax(-1))

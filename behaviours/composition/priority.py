@@ -25,6 +25,8 @@ class Priority(Policy):
     Source: Brooks 1986, "A robust layered control system for a mobile robot".
     """
 
+    _thresholds: Tensor
+
     def __init__(
         self,
         bank: BehaviourBank,
@@ -36,12 +38,15 @@ class Priority(Policy):
         super().__init__(bank, bank.names if order is None else list(order))
         defaults = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
         self.thresholds = self.per_behaviour(thresholds, defaults, "thresholds")
+        # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.
+        column = torch.tensor(self.thresholds, device=self.space.device)[:, None]
+        self.register_buffer("_thresholds", column, persistent=False)
 
     def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """The answer to encoded and protected conditions, see `Policy.query`."""
         answers = [part.query(conditions) for part in self.parts]
         familiarity = torch.stack([recall.familiarity for recall in answers])
-        known = familiarity > torch.tensor(self.thresholds, device=familiarity.device)[:, None]
+        known = familiarity > self._thresholds
         speaker = torch.where(known.any(0), known.to(torch.int8).argmax(0), familiarity.argmax(0))
         rows = torch.arange(conditions.shape[0], device=speaker.device)
 

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import pytest
 import torch
-from devices import another_device
+from devices import DEVICES, another_device
 
 
 @pytest.fixture(autouse=True)
@@ -16,8 +16,8 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
-@pytest.fixture(scope="module")
-def there() -> Iterator[Callable[..., None]]:
-    """`there(check, *arguments)` in a process with the pretended device."""
-    with another_device() as run:
+@pytest.fixture(scope="module", params=DEVICES)
+def there(request: pytest.FixtureRequest) -> Iterator[Callable[..., None]]:
+    """`there(check, *arguments)` in a process with another device."""
+    with another_device(request.param) as run:
         yield run

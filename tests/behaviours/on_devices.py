@@ -1,30 +1,27 @@
-"""Compare answers of the CPU with those of the pretended device."""
+"""Compare answers of the CPU with those of another device."""
 
 from collections.abc import Callable
 from typing import Any
 
 import torch
+from devices import other
 from torch import Tensor, nn
 from torch.testing import assert_close
-
-TOLERANCE = 1e-5
 
 
 def same(work: Callable[..., Any], *arguments: Tensor | nn.Module, exact: bool = True, waits: bool = False) -> None:
     """`work` answers alike on both devices, where its arguments are, and does not wait for the device unless it may."""
-    from pretended import brought_back, moved, waited
-
-    copies = [moved(argument) for argument in arguments]
-    waited.clear()
+    copies = [other().moved(argument) for argument in arguments]
+    other().waited.clear()
     away = work(*copies)
-    assert waits or waited == []
-    close(brought_back(away), brought(work(*arguments)), exact)
+    assert waits or other().waited == []
+    close(other().brought_back(away), brought(work(*arguments)), exact)
 
 
-def close(answer: Any, expected: Any, exact: bool) -> None:
-    """The same numbers in the same type, or nearly so."""
-    tolerance = 0 if exact else TOLERANCE
-    assert_close(answer, expected, atol=tolerance, rtol=tolerance, equal_nan=True)
+def close(answer: Any, expected: Any, exact: bool = False, tolerance: float | None = None) -> None:
+    """The same numbers in the same type, or as nearly so as the device rounds like the CPU."""
+    allowed = 0 if exact else other().TOLERANCE if tolerance is None else tolerance
+    assert_close(answer, expected, atol=allowed, rtol=allowed, equal_nan=True)
 
 
 def brought(answer: Any) -> Any:

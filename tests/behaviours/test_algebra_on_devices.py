@@ -5,6 +5,7 @@ from typing import Any
 
 import pytest
 import torch
+from devices import other
 from on_devices import same, seeded
 from torch import Tensor
 
@@ -19,29 +20,29 @@ def test_it_is_as_strict_as_a_gpu(there: Callable[..., None]) -> None:
 
 
 def check_strictness() -> None:
-    from pretended import NAME, brought_back, moved, waited
-
     here = torch.arange(4)
-    away = moved(here)
-    assert away.device.type == torch.ones(1, device=NAME).device.type == NAME
+    away = other().moved(here)
+    assert away.device.type == torch.ones(1, device=other().NAME).device.type == other().NAME
     mixed: list[Callable[[], Any]] = [lambda: away + here, lambda: here[away], lambda: torch.stack([here, away])]
     for mix in mixed:
-        with pytest.raises(RuntimeError, match="on the CPU and on another device"):
+        with pytest.raises(RuntimeError, match="device"):
             mix()
-    with pytest.raises(TypeError, match="no NumPy array"):
+    with pytest.raises(TypeError, match=r"[Nn]um[Pp]y"):
         away.numpy()
     with pytest.raises(AssertionError, match="on the CPU"):
-        brought_back(here)
+        other().brought_back(here)
     away[here[:2]] += 1
-    assert brought_back(away).tolist() == [1, 2, 2, 3]
+    assert other().brought_back(away).tolist() == [1, 2, 2, 3]
     waits: list[Callable[[], Any]] = [away.sum().item, away.cpu, away.tolist, away.unique, lambda: away[away > 1]]
+    waits += [lambda: torch.tensor([1, 2], device=other().NAME), lambda: away[[0, 1]]]
     for wait in waits:
-        waited.clear()
+        other().waited.clear()
         wait()
-        assert len(waited) == 1
-    waited.clear()
-    assert brought_back(away.to(torch.int8).clamp(0, 1)[away]).tolist() == [1, 1, 1, 1]
-    assert waited == []
+        assert other().waited
+    other().waited.clear()
+    looked_up = away.to(torch.int8).clamp(0, 1)[away]
+    assert other().waited == []
+    assert other().brought_back(looked_up).tolist() == [1, 1, 1, 1]
 
 
 @pytest.mark.parametrize("rows", [3, 200])
@@ -58,7 +59,9 @@ def check_algebra(name: str, rows: int) -> None:
         same(verb, a, b, exact=vsa.integer)
     same(vsa.permute, a, numbers)
     same(lambda a: vsa.permute(a, -3), a)
-    same(lambda a, b: vsa.bundle(torch.stack([a, b]), 0), a, b)
+    # Circular convolution and complex numbers round in an order of the device's own.
+    rounds_alike = vsa.elementwise and not vsa.dtype.is_complex
+    same(lambda a, b: vsa.bundle(torch.stack([a, b]), 0), a, b, exact=rounds_alike)
     same(lambda a, w: vsa.bundle(a, weights=w), a, numbers, exact=vsa.integer)
     same(lambda a, w: vsa.normalize(vsa.superpose(a, weights=w)), a, numbers, exact=vsa.integer)
     same(lambda a, b, w: vsa.permute(vsa._bundle_pair(a, b[0]), w), a, b, numbers, exact=vsa.integer)
@@ -73,17 +76,15 @@ def test_blocks_on_it_are_larger(there: Callable[..., None]) -> None:
 
 
 def check_blocks() -> None:
-    from pretended import brought_back, moved
-
     seen: list[int] = []
 
     def work(rows: Tensor) -> Tensor:
         seen.append(len(rows))
         return rows + 1
 
-    answer = by_blocks(work, moved(torch.arange(10)), row_bytes=2**26, block_bytes=1)
+    answer = by_blocks(work, other().moved(torch.arange(10)), row_bytes=2**26, block_bytes=1)
     assert seen == [4, 4, 2]
-    assert brought_back(answer).tolist() == list(range(1, 11))
+    assert other().brought_back(answer).tolist() == list(range(1, 11))
 
 
 def test_a_graph_rotates_in_one_pass(there: Callable[..., None]) -> None:
@@ -91,15 +92,13 @@ def test_a_graph_rotates_in_one_pass(there: Callable[..., None]) -> None:
 
 
 def check_graph() -> None:
-    from pretended import brought_back, moved
-
     vsa = torchvsa.MAP(100, dtype=torch.int8)
     vectors = vsa.bundle(vsa.random(200, 3, generator=seeded(0)))
-    protect, asked = moved(SelfShift(vsa, seed=0)), moved(vectors)
+    protect, asked = other().moved(SelfShift(vsa, seed=0)), other().moved(vectors)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(torch.compiler, "is_compiling", lambda: True)
         patch.setattr("torch.Tensor.as_strided", None)
-        answer = brought_back(protect(asked))
+        answer = other().brought_back(protect(asked))
     assert torch.equal(answer, SelfShift(vsa, seed=0)(vectors))
 
 

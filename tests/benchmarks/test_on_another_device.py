@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 import torch
-from devices import another_device
+from devices import another_device, other
 
 
 @pytest.fixture(scope="module")
@@ -21,8 +21,6 @@ def test_what_is_timed_runs_there(there: Callable[..., Any], work: str) -> None:
 
 
 def check_work(work: str) -> None:
-    from pretended import NAME, brought_back
-
     from behaviours import Behaviour
     from benchmarks.works import WORKS
 
@@ -32,11 +30,11 @@ def check_work(work: str) -> None:
         patch.setattr("torchhd.bind", torch.mul)
         patch.setattr("benchmarks.literal.Literal.learn", lambda *_: 0)
         patch.setattr(torch, "compile", lambda call, **_: call)
-        patch.setattr("benchmarks.floors._SIDE", {NAME: 8})
+        patch.setattr("benchmarks.floors._SIDE", {other().NAME: 8})
         count = 0
-        for case in WORKS[work].cases(NAME, True):
+        for case in WORKS[work].cases(other().NAME, True):
             answer: Any = case.ours(0)
-            brought_back(answer.program if isinstance(answer, Behaviour) else answer)
+            other().brought_back(answer.program if isinstance(answer, Behaviour) else answer)
             if case.floor is not None:
                 case.floor.call(0)
             count += 1
@@ -50,8 +48,6 @@ def test_growth_is_measured_there(there: Callable[..., Any]) -> None:
 
 
 def grown() -> list[dict[str, Any]]:
-    from pretended import NAME
-
     from benchmarks import growth
 
-    return list(growth.rows(NAME, threads=1, repeats=1, small=True))
+    return list(growth.rows(other().NAME, threads=1, repeats=1, small=True))

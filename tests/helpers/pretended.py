@@ -15,6 +15,8 @@ from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils.backend_registration import _setup_privateuseone_for_python_backend
 
 NAME = "pretended"
+TOLERANCE, TRAINED = 1e-5, 1e-5
+"""How far floats may be from those of the CPU, which computes them; and those of a program that was trained."""
 aten = torch.ops.aten
 
 _setup_privateuseone_for_python_backend(NAME)
@@ -53,6 +55,11 @@ class Pretended(TorchDispatchMode):
 
     def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
         return _run(func, args, kwargs or {})
+
+
+def on() -> Pretended:
+    """What makes the device be there."""
+    return Pretended()
 
 
 _VIEWS: dict[Any, Any] = {aten._conj.default: aten.conj_physical.default, aten._neg_view.default: aten.neg.default}
@@ -102,6 +109,8 @@ def _empty_strided(size: Any, stride: Any, dtype: Any = None, **_: Any) -> Tenso
 
 
 def _copy_from(source: Tensor, target: Tensor, non_blocking: bool = False) -> Tensor:
+    if not isinstance(source, Elsewhere):
+        waited.append("copying numbers")
     here = [x.content if isinstance(x, Elsewhere) else x for x in (target, source)]
     here[0].copy_(here[1])
     return target
