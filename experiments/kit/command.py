@@ -34,8 +34,8 @@ TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 
 LONGEST_NAME = 80
 
-# Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a default
-# must stay the object that `dataclasses` compares with.
+# Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a
+# default must stay the object that `dataclasses` compares with.
 copyreg.pickle(type(dataclasses.MISSING), lambda missing: "MISSING")
 
 
