@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -20,18 +22,16 @@ def print_help(study: Study, console: Console) -> None:
     for one in described(study.settings):
         table.add_row(*(escape(text) for text in one))
     console.print(table)
-    groups = {
-        field.metadata["group"] for field in study.settings.__dataclass_fields__.values() if "group" in field.metadata
-    }
-    table = Table(
-        title="\nOptions of groups: group=option; their settings: group.name=value", box=None, title_justify="left"
-    )
-    table.add_column("group")
-    table.add_column("options", overflow="fold")
-    for group in GROUPS:
-        if group in groups:
-            table.add_row(group, ", ".join(options(group)))
-    console.print(table)
+    if groups := groups_of(study.settings):
+        table = Table(
+            title="\nOptions of groups: group=option; their settings: group.name=value", box=None, title_justify="left"
+        )
+        table.add_column("group")
+        table.add_column("options", overflow="fold")
+        for group in GROUPS:
+            if group in groups:
+                table.add_row(group, ", ".join(options(group)))
+        console.print(table)
     if study.presets:
         console.print(f"\nPresets: experiment={' or experiment='.join(study.presets)}", markup=False)
     console.print(
@@ -39,3 +39,14 @@ def print_help(study: Study, console: Console) -> None:
         "\nThe same command goes on where it stopped. --config-dir FOLDER adds presets of your own.",
         markup=False,
     )
+
+
+def groups_of(settings: type) -> set[str]:
+    """The config groups of which settings, and those nested in them, hold an option."""
+    found: set[str] = set()
+    for field in dataclasses.fields(settings):
+        if "group" in field.metadata:
+            found.add(field.metadata["group"])
+        elif "settings" in field.metadata:
+            found |= groups_of(field.metadata["settings"])
+    return found
