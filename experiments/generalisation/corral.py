@@ -70,8 +70,10 @@ class Generalisation(Driving):
         ["default", "narrow", "offset_lamp", "large"], "`default` first, then unseen ones", choices=sim.ARENAS,
         distinct=True,
     )  # fmt: skip
-    starts: int = setting(48, "held-out starts in each arena for the teacher and the default, shared by the draws")
-    variant_starts: int = setting(18, "for the baselines and the combinations with one part changed")
+    starts: int = setting(
+        48, "held-out starts in each arena for the teacher and the default, shared by the draws", low=1
+    )
+    variant_starts: int = setting(18, "starts for the baselines and the combinations with one part changed", low=1)
 
     def combinations(self) -> list[Combination]:
         """All of them, the default first."""
