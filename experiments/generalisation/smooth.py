@@ -177,7 +177,8 @@ def by_levels(outcome: Outcome) -> Figure:
     axes.set_xscale("log")
     axes.set_xticks(levels, [str(level) for level in levels])
     axes.minorticks_off()
-    axes.set(ylim=(0, 1), title="Smooth commands: error", xlabel="levels per wheel")
+    axes.set_ylim(bottom=0)
+    axes.set(title="Smooth commands: error", xlabel="levels per wheel")
     axes.set_ylabel("error, as a share of that of the mean command")
     figure.legend(handles=handles, loc="outside right upper", fontsize=7)
     return figure

@@ -16,7 +16,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, grid, setting
-from experiments.kit.figures import BLACK, BLUE, GREY
+from experiments.kit.figures import BLACK, BLUE, GREY, legend_below
 from experiments.models import torchhd
 from experiments.models.classifiers import CLASSIFIERS, SLOWEST, accuracy, not_installed
 from experiments.tasks.wall_following import FOLDS, SENSORS, SPLITS, samples
@@ -159,7 +159,7 @@ def dots(outcome: Outcome) -> Figure:
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.set(title=f"Wall following, {sensors} sensors", xlabel="accuracy on the fifth left out")
     axes.grid(visible=False, axis="y")
-    axes.legend(loc="lower left")
+    legend_below(figure, axes)
     return figure
 
 
