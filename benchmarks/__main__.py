@@ -11,7 +11,7 @@ import torch
 from behaviours.storage import write_atomically
 from benchmarks.isolated import isolated
 from benchmarks.report import draw, fill, print_rows, wide_console
-from benchmarks.works import GROWTH, KEPT, ON_THE_CPU, WORKS, measure
+from benchmarks.works import FIT_TIMES, GROWTH, KEPT, ON_THE_CPU, WORKS, measure
 
 FOLDER = Path(__file__).parent
 
@@ -19,7 +19,7 @@ FOLDER = Path(__file__).parent
 def main() -> None:
     """Measure and print the table; a whole run writes `results.json` and draws it into `docs/` too."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description="Speed beside peers.")
-    parser.add_argument("--only", nargs="+", choices=[*WORKS, GROWTH], help="print these works alone")
+    parser.add_argument("--only", nargs="+", choices=[*WORKS, GROWTH, FIT_TIMES], help="print these works alone")
     parser.add_argument("--threads", nargs="+", type=int, help="1 and 2 by default; on a GPU, which has its own, 1")
     parser.add_argument("--repeats", type=int, default=7, help="timed runs of each call, after one to warm up")
     parser.add_argument("--device", choices=["cpu", "cuda"], default="cpu")

@@ -34,7 +34,7 @@ class _Table:
 
 
 def print_rows(rows: Sequence[Row], console: Console) -> None:
-    """Ratios to the peers, then exponents of growth."""
+    """Ratios to the peers, then exponents of growth, then fits with their accuracy."""
     for shown in _tables(rows):
         table = Table(title=shown.title)
         for name, side in shown.columns.items():
@@ -55,9 +55,10 @@ def fill(page: Path, rows: Sequence[Row]) -> None:
 
 
 def _tables(rows: Sequence[Row]) -> list[_Table]:
-    """Beside peers, where freed memory is returned and where it is kept, and growth."""
+    """Compared with peers, where freed memory is returned and where it is kept; growth; and fits of real data."""
     grown = [row for row in rows if "exponent" in row]
-    compared = [row for row in rows if "exponent" not in row]
+    fitted = [row for row in rows if "ours_accuracy" in row]
+    compared = [row for row in rows if "exponent" not in row and "ours_accuracy" not in row]
     # The marks of a page's tables on the CPU bear no name of a device.
     device = "" if rows[0]["device"] == "cpu" else f", {rows[0]['device']}"
     tables = []
@@ -68,6 +69,9 @@ def _tables(rows: Sequence[Row]) -> list[_Table]:
     if grown:
         title = f"{grown[0]['machine']}, time = size ^ exponent"
         tables.append(_Table(f"growth{device}", title, _GROWN, [_grown_cells(row) for row in grown]))
+    if fitted:
+        title = f"{fitted[0]['machine']}, seconds of all folds and mean accuracy"
+        tables.append(_Table("fits", title, _FITTED, [_fitted_cells(row) for row in fitted]))
     return tables
 
 
@@ -89,6 +93,17 @@ _GROWN: dict[str, Literal["left", "right"]] = {
     "exponent": "right",
     "at the top": "right",
 }
+_FITTED: dict[str, Literal["left", "right"]] = {
+    "work": "left",
+    "size": "left",
+    "threads": "right",
+    "ours": "right",
+    "accuracy": "right",
+    "peer": "left",
+    "theirs": "right",
+    "their accuracy": "right",
+    "ratio": "right",
+}
 
 
 def _compared_cells(row: Row) -> list[str]:
@@ -100,6 +115,12 @@ def _compared_cells(row: Row) -> list[str]:
 def _grown_cells(row: Row) -> list[str]:
     exponents = (f"{row[name]:.2f}" for name in ("exponent", "exponent_at_the_top"))
     return [row["work"], row["shape"], time_of(row["ours_s"]), *exponents]
+
+
+def _fitted_cells(row: Row) -> list[str]:
+    ours = [time_of(row["ours_s"]), f"{row['ours_accuracy']:.3f}"]
+    theirs = [time_of(row["peer_s"]), f"{row['peer_accuracy']:.3f}"]
+    return [row["work"], row["shape"], str(row["threads"]), *ours, row["peer"], *theirs, _times(row["ratio"])]
 
 
 def _times(ratio: float | None) -> str:

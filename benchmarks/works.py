@@ -3,7 +3,18 @@
 import argparse
 from typing import Any
 
-from benchmarks import cleanup, encoding, growth, imports, learning, protection, random_vectors, recall, rollouts
+from benchmarks import (
+    cleanup,
+    encoding,
+    fit_times,
+    growth,
+    imports,
+    learning,
+    protection,
+    random_vectors,
+    recall,
+    rollouts,
+)
 from benchmarks.harness import time_case
 from benchmarks.report import wide_console
 
@@ -22,12 +33,16 @@ KEPT = ("encoding", "protection", "random", "recall")
 ON_THE_CPU = ("rollouts", "imports")
 """Works that no other device has a part in."""
 GROWTH = "growth"
+FIT_TIMES = "fit_times"
+"""Runs only if it is named."""
 
 
 def measure(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
     """The rows of one work, with the options of the command."""
     if name == GROWTH:
         return list(growth.rows(options.device, max(options.threads), small=options.small))
+    if name == FIT_TIMES:
+        return list(fit_times.rows(max(options.threads), small=options.small))
     rows, console = [], wide_console()
     for case in WORKS[name].cases(options.device, options.small):
         for threads in options.threads:
