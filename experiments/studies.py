@@ -1,5 +1,5 @@
 """All studies: importing this module registers them."""
 
-from experiments import capacity
+from experiments import capacity, corral
 
-__all__ = ["capacity"]
+__all__ = ["capacity", "corral"]
