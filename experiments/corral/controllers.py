@@ -33,13 +33,17 @@ class Task:
         settings: of the run.
         train: all demonstrated samples.
         bank: what was learned over the codebooks of the run, see `learn`.
-        validate: drives a candidate from starts that are neither demonstrated nor held out.
     """
 
     settings: Corral
     train: Demonstrations
     bank: BehaviourBank
-    validate: Callable[[sim.ControllerLike], sim.Rollout]
+
+    def validate(self, policy: sim.ControllerLike) -> float:
+        """The success of a candidate from starts that are neither demonstrated nor held out."""
+        episodes = range(corral.FIRST_VALIDATION, corral.FIRST_VALIDATION + self.settings.validation_starts)
+        rollout = corral.drive(self.settings, policy, episodes, corral.arena(self.settings.arena))
+        return rollout.summary().success_rate
 
 
 @dataclass(frozen=True)
@@ -143,7 +147,7 @@ def paper_best_bins(task: Task) -> Controller:
     candidates = [
         {
             "bins": bins,
-            "validation_success": task.validate(program.policy).summary().success_rate,
+            "validation_success": task.validate(program.policy),
             "train_agreement": share_right(program.policy, task.train),
         }
         for bins, program in zip(choices, programs, strict=True)

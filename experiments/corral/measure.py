@@ -13,7 +13,7 @@ import pandas as pd
 from rich.progress import Progress
 
 import sim
-from behaviours import BehaviourBank, Demonstrations
+from behaviours import Demonstrations
 from experiments.corral.command_map import command_maps
 from experiments.corral.controllers import CONTROLLERS, Controller, Task, learn, starts
 from experiments.corral.failures import ambiguous_share, ends, mistakes, unlike_teacher
@@ -31,19 +31,15 @@ class Material:
     """What all cells share.
 
     Attributes:
-        settings: of the run.
+        task: what controllers learn from.
         folder: where trajectories, maps and programs are kept for the page.
-        train: all demonstrated samples.
-        moving: those of them before the lamp was reached; a file does not say when that was, so all of its samples.
-        bank: what was learned over the codebooks of the run.
+        moving: the demonstrated samples before the lamp was reached; all of a file, which does not say when that was.
         examined: the teacher from the held-out starts.
     """
 
-    settings: Corral
+    task: Task
     folder: Path
-    train: Demonstrations
     moving: Demonstrations
-    bank: BehaviourBank
     examined: sim.Rollout
 
 
@@ -63,7 +59,7 @@ def prepare(settings: Corral, folder: Path, progress: Progress) -> Material:
     progress.remove_task(bar)
     held_out = range(settings.starts)
     examined = corral.drive_together(settings, "teacher, held out", teacher, held_out, progress, arena)
-    return Material(settings, folder, train, moving, bank, examined)
+    return Material(Task(settings, train, bank), folder, moving, examined)
 
 
 def measure(material: Material, cell: Cell) -> list[Row]:
@@ -72,21 +68,13 @@ def measure(material: Material, cell: Cell) -> list[Row]:
     A row of the kind `controller` comes first; then one for each behaviour that was learned (`learning`), for each
     `candidate` that was compared to choose settings, for each kind of `mistake`, and for each `episode`.
     """
-    name, settings = cell["controller"], material.settings
-    arena = corral.arena(settings.arena)
-    validation = range(corral.FIRST_VALIDATION, corral.FIRST_VALIDATION + settings.validation_starts)
-    controller = CONTROLLERS[name](
-        Task(
-            settings,
-            material.train,
-            material.bank,
-            lambda policy: corral.drive(settings, policy, validation, arena),
-        )
-    )
+    name, settings = cell["controller"], material.task.settings
+    controller = CONTROLLERS[name](material.task)
     held_out = corral.moving(material.examined)
     rollout = material.examined
     if name != "teacher":
         episodes = range(starts(settings, name))
+        arena = corral.arena(settings.arena)
         rollout = corral.drive(settings, controller.policy, episodes, arena, controller.body, record=True)
     keep(material, name, controller, rollout, held_out)
     about = {
@@ -118,14 +106,14 @@ def keep(material: Material, name: str, controller: Controller, rollout: sim.Rol
     if controller.bank is not None and name != "default":
         controller.bank.save(folder / f"{name}.safetensors")
     if name in ("paper", "paper_best_bins") and controller.bins is not None:
-        found = recalled(learners(material.settings, controller.bins), material.moving)
+        found = recalled(learners(material.task.settings, controller.bins), material.moving)
         write_frame(folder / "recall" / f"{name}.parquet", found.assign(bins=controller.bins))
 
 
 def agreement(material: Material, controller: Controller, held_out: Demonstrations) -> Row:
     """How often a controller does what the teacher does, and how much of the rest no program could get right."""
     program = controller.program
-    found = compare(controller.policy, controller.space, material.moving, held_out, material.bank.space)
+    found = compare(controller.policy, controller.space, material.moving, held_out, material.task.bank.space)
     ambiguous = None if program is None else ambiguous_share(program, material.moving, held_out)
     return {
         "train_agreement": found.train,
