@@ -28,6 +28,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     run_study(study, rest)
 
 
+def corral() -> None:
+    """Run `torchvsa-corral [setting=value ...]`, which is `torchvsa corral`."""
+    main(["corral", *sys.argv[1:]])
+
+
 def draw_again(arguments: Sequence[str]) -> None:
     """Draw the pages of finished runs again, from their results."""
     with errors_in_one_line("torchvsa draw"):

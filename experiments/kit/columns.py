@@ -37,8 +37,9 @@ class Column:
         format: of a number, as in Python's format strings; or a function of the whole row that returns text.
         interval: the keys of a lower and an upper bound, shown after the value.
         best: which value is marked, if any.
-        alike: a key whose values must be equal in all rows, or nothing is marked: what was measured on other samples
-            does not compare.
+        among: which rows compete to be the best; all do by default.
+        alike: a key whose values must be equal in all rows that compete, or nothing is marked: what was measured on
+            other samples does not compare.
         bad: which values are marked as bad.
         about: the definition that stands below the table.
     """
@@ -48,6 +49,7 @@ class Column:
     format: str | Callable[[Row], str] = ""
     interval: tuple[str, str] | None = None
     best: Literal["", "max", "min"] = ""
+    among: Callable[[Row], bool] = lambda row: True
     alike: str | None = None
     bad: Callable[[Any], bool] | None = None
     about: str = ""
@@ -72,12 +74,13 @@ class Column:
 
     def cells(self, rows: Sequence[Row]) -> list[Cell]:
         """The column's cells, with the best and the bad ones marked."""
-        known = [row[self.key] for row in rows if isinstance(row.get(self.key), int | float)]
-        alike = self.alike is None or len({row.get(self.alike) for row in rows}) == 1
+        compete = [row for row in rows if self.among(row)]
+        known = [row[self.key] for row in compete if isinstance(row.get(self.key), int | float)]
+        alike = self.alike is None or len({row.get(self.alike) for row in compete}) == 1
         best = None
         if self.best and alike and len(set(known)) > 1:
             best = {"max": max, "min": min}[self.best](known)
-        return [Cell(self.text(row), self._mark(row.get(self.key), best)) for row in rows]
+        return [Cell(self.text(row), self._mark(row.get(self.key), best if self.among(row) else None)) for row in rows]
 
     def _mark(self, value: object, best: object) -> Literal["", "best", "bad"]:
         if value is None:

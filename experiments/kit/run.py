@@ -46,7 +46,7 @@ def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
     records = pd.DataFrame([cell | row for cell in cells for row in kept.find(cell) or []])
     table = [store.plain(row) for row in study.summarise(settings, records)]
     metrics = store.plain({**_metrics(study, table), **study.metrics(settings, records, table)})
-    outcome = Outcome(folder, settings, config, records, table, metrics, store.provenance())
+    outcome = Outcome(folder, settings, config, records, table, metrics, store.provenance(study.name))
     store.write_frame(folder / "records.parquet", records)
     store.write_results(
         folder / "results.json",

@@ -95,7 +95,7 @@ def plain(value: Any) -> Any:
     return value
 
 
-def provenance() -> Row:
+def provenance(study: str) -> Row:
     """Where results come from: commit, versions, date, machine, threads and the full command."""
     versions = {"python": platform.python_version(), "torchvsa": torchvsa.__version__}
     for name in LIBRARIES:
@@ -110,7 +110,7 @@ def provenance() -> Row:
         "platform": platform.platform(),
         "cpus": os.cpu_count(),
         "threads": torch.get_num_threads(),
-        "command": [Path(sys.argv[0]).name, *sys.argv[1:]],
+        "command": ["torchvsa", study, *sys.argv[1:]],
         "versions": versions,
     }
 

@@ -1,0 +1,77 @@
+"""What the main job can be told, and what is refused before anything is driven."""
+
+from dataclasses import dataclass
+
+import sim
+from behaviours import BehaviourBank, Demonstrations, OneShot
+from experiments.corral.controllers import CONTROLLERS, printed_space
+from experiments.kit import Part, part, parts, setting, settings
+from experiments.models import hand_written
+from experiments.tasks import corral
+
+
+@dataclass
+class Paper:
+    """Codes and rule of the printed algorithms."""
+
+    encoder: Part = part("encoder", "lookup", "the code of one reading; its bins are those of the run's encoder")
+    record: Part = part("record", "sum", "how the codes of all sensors become a condition")
+    protection: Part = part("protection", "self_shift", "what is done to a condition before it is bound")
+    rule: Part = part("rule", "literal", "how a program is learned")
+
+
+@dataclass
+class Corral(corral.Learning):
+    """The settings of this study."""
+
+    composition: Part = part("composition", "bundle", "how the row bundled combines its three behaviours")
+    paper: Paper = settings(Paper, "the rows paper and paper_best_bins: the printed algorithms, read literally")
+    controllers: list[str] = setting(
+        list(CONTROLLERS), "the rows of the table, in this order", choices=lambda: CONTROLLERS, distinct=True
+    )
+    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    demonstrations_file: str | None = setting(
+        None, "or a file of your own to learn from, as written by behaviours.Demonstrations.save"
+    )
+    starts: int = setting(1000, "held-out starts for teacher, default and bundled", low=1)
+    wheeled_starts: int = setting(500, "held-out starts for the teacher on the wheeled body", low=1)
+    other_starts: int = setting(200, "held-out starts for every other controller", low=1)
+    paper_bins: list[int] = setting(
+        [2, 3, 4, 6, 8, 12, 16], "tried for paper_best_bins, and the bins of paper", low=1, distinct=True, empty=True
+    )
+    validation_starts: int = setting(40, "starts to choose among them, not among the held-out ones", low=1)
+    animate: bool = setting(True, "draw one episode of teacher and learned robot side by side, as an animation")
+
+
+def check(settings: Corral) -> None:
+    """Raise for settings with which something could not be built, learned or combined."""
+    space, rule = corral.space(settings), parts.rule(settings.rule)
+    corral.arena(settings.arena)
+    if {"default", "bundled"} & set(settings.controllers):
+        parts.refuse_unsupported(rule, space)
+    if "bundled" in settings.controllers:
+        bank = BehaviourBank(space)
+        for name in sim.BEHAVIOURS:
+            bank.learn(name, Demonstrations([[0.0, 0.0, 0.0]], [[1.0, 1.0]]), OneShot())
+        parts.policy(bank, settings.composition)
+    if {"paper", "paper_best_bins"} & set(settings.controllers):
+        parts.refuse_unsupported(parts.rule(settings.paper.rule), printed_space(settings))
+    if "hand_written" in settings.controllers:
+        hand_written.behaviour(space.vsa, settings.seed)
+    if settings.demonstrations_file is not None:
+        corral.from_file(settings.demonstrations_file)
+
+
+PAPER = {"encoder": "lookup", "record": "sum", "protection": "self_shift", "rule": "literal"}
+PRESETS = {
+    "quick": {
+        "demonstrations": 20,
+        "starts": 40,
+        "wheeled_starts": 20,
+        "other_starts": 20,
+        "paper_bins": [2, 4],
+        "validation_starts": 10,
+    },
+    "paper": {"defaults": [{f"override /{group}": option} for group, option in PAPER.items()]},
+}
+"""A look at the whole job within a minute; and the printed algorithms for all learned rows."""
