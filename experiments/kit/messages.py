@@ -9,6 +9,7 @@ from hydra.errors import HydraException
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException, ValidationError
 
 KINDS = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false", "String": "a text"}
+WRONG_TYPE = re.compile(r"Value '(.*?)'(?: of type .*)? could .* converted to (\w+)")
 
 
 def in_words(error: BaseException) -> str:
@@ -31,7 +32,7 @@ def _of_omegaconf(error: OmegaConfBaseException) -> str:
         near = difflib.get_close_matches(str(error.key), known, 1)
         hint = f"did you mean {near[0]}?" if near else f"choose from {', '.join(known)}"
         return f"there is no setting {key!r}; {hint}"
-    if isinstance(error, ValidationError) and (found := re.search(r"Value '(.*)' .* converted to (\w+)", str(error))):
+    if isinstance(error, ValidationError) and (found := WRONG_TYPE.search(str(error))):
         return f"{key}={found[1]}: expected {KINDS.get(found[2], found[2])}"
     if isinstance(error, ValidationError) and "ListConfig" in str(error):
         return f"{key}: expected a list, e.g. {key}=[a,b]"
