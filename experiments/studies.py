@@ -1,6 +1,7 @@
 """All studies: importing this module registers them."""
 
 from experiments import capacity
-from experiments.robustness import study as robustness
+from experiments.observability.study import study as observability
+from experiments.robustness.study import study as robustness
 
-__all__ = ["capacity", "robustness"]
+__all__ = ["capacity", "observability", "robustness"]
