@@ -1,5 +1,5 @@
 """All studies: importing this module registers them."""
 
-from experiments import capacity, corral, generalisation
+from experiments import capacity, corral, generalisation, robustness
 
-__all__ = ["capacity", "corral", "generalisation"]
+__all__ = ["capacity", "corral", "generalisation", "robustness"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import matplotlib
@@ -73,10 +73,14 @@ def lines(
     low: str | None = None,
     high: str | None = None,
     fixed: Mapping[str, Look] | None = None,
+    dashed: Collection[str] = (),
+    apart: float = 0.0,
 ) -> None:
     """Draw a line for each value of `hue`, in that `order` or the frame's; `low` and `high` are columns of a band.
 
-    Without those two, rows with the same x are repeats: the line is their median, the band lowest to highest.
+    Without those two, rows with the same x are repeats: the line is their median, the band lowest to highest. The lines
+    of the names `dashed` are dashed. Lines that are `apart` are each moved by this much along x against the one before,
+    and have bars instead of bands, so that no interval hides another.
     """
     import seaborn  # takes a second to load
 
@@ -84,15 +88,21 @@ def lines(
     chosen = looks(names, fixed)
     colours = {name: look[0] for name, look in chosen.items()}
     markers = {name: look[1] for name, look in chosen.items()}
+    dashes: dict[Any, Any] = {name: (4, 2) if name in dashed else "" for name in names}
+    moved = {name: apart * (place - (len(names) - 1) / 2) for place, name in enumerate(names)}
+    frame = frame.assign(**{x: frame[x] + [moved.get(name, 0.0) for name in frame[hue]]}) if apart else frame
     seaborn.lineplot(
         frame, x=x, y=y, hue=hue, style=hue, hue_order=names, style_order=names, palette=colours, markers=markers,
-        dashes=False, estimator="median", errorbar=None if low is not None else ("pi", 100), ax=axes, markersize=5.5,
+        dashes=dashes, estimator="median", errorbar=None if low is not None else ("pi", 100), ax=axes, markersize=5.5,
         markeredgewidth=0, linewidth=1.4, err_kws={"alpha": 0.15, "linewidth": 0},
     )  # fmt: skip
     if low is not None and high is not None:
         for name in names:
             own = frame.loc[frame[hue] == name].sort_values(by=x)
-            axes.fill_between(own[x], own[low], own[high], color=colours[name], alpha=0.15, linewidth=0)
+            if apart:
+                axes.vlines(own[x], own[low], own[high], color=colours[name], alpha=0.4, linewidth=1.6)
+            else:
+                axes.fill_between(own[x], own[low], own[high], color=colours[name], alpha=0.15, linewidth=0)
 
 
 def legend_below(figure: Figure, axes: Axes, columns: int | None = None) -> None:

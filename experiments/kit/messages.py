@@ -46,7 +46,7 @@ def _of_omegaconf(error: OmegaConfBaseException) -> str:
         if "ListConfig" in text:
             return f"{key}: expected a list, e.g. {key}=[a,b]"
         if found := re.search(
-            r"Value '(.*?)' (?:of type '.*?' could not be converted to (\w+)|is not a valid (\w+))", text
+            r"Value '(.*?)' (?:(?:of type '.*?' )?could not be converted to (\w+)|is not a valid (\w+))", text
         ):
             return f"{key}={found[1]}: expected {KINDS.get(found[2] or found[3], found[2] or found[3])}"
     return f"{key}: {' '.join(str(error.msg or error).split())}" if key else text

@@ -136,8 +136,13 @@ def _metrics(study: Study, table: Sequence[Row]) -> dict[str, Any]:
     """Every number of the table as `key.key.column`; keys that a row does not have are left out."""
     metrics = {}
     for row in table:
-        name = ".".join(str(row[key]) for key in study.keys if row.get(key) is not None)
+        name = ".".join(_short(row[key]) for key in study.keys if row.get(key) is not None)
         for column, value in row.items():
             if column not in study.keys and not isinstance(value, str | list | dict):
                 metrics[f"{name}.{column}"] = value
     return metrics
+
+
+def _short(key: object) -> str:
+    """A key as text; numbers as one writes them, `1` for 1.0."""
+    return str(int(key)) if isinstance(key, float) and key.is_integer() else str(key)

@@ -1,28 +1,37 @@
 """The study of partly observable states: its figures by hand, and the command as a user would run it."""
 
+import io
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
-from commands import corral, only, output_of, results
+from commands import only, output_of, results
+from kits import composed
+from rich.console import Console
 
 import sim
 from behaviours import Demonstrations
-from experiments.observability import check
-from experiments.observability_curves import curves
-from experiments.observability_disturbances import DISTURBANCES, HIGH, LOW, Disturbance, Disturbed
-from experiments.observability_learners import Asked, Learned, Remembering, Study, best, compare
-from experiments.observability_lessons import Lessons, Memory
-from experiments.observability_report import mean_over, sentences
+from experiments.kit.run import check_all, run
+from experiments.main import main
+from experiments.observability.disturbances import DISTURBANCES, HIGH, LOW, Disturbance, DisturbedPolicy
+from experiments.observability.learners import Learned, Task, best, compare
+from experiments.observability.memory import Memory, TeacherRuns
+from experiments.observability.page import curves, means, sentence
+from experiments.observability.study import Observability, cells, study
+from experiments.observability.windows import ProgramAnswer, WindowPolicy
 
 SMALL = (
     "demonstrations=8", "validation=4", "heldout=4", "starts=4", "seconds=4", "vsa.dim=300", "encoder.bins=8",
     "encoder.span=2", "epochs=2", "lags=[[1],[1,2]]", "leaves=[5]", "strengths.missing=[0,0.5]",
     "strengths.aliased=[0,1]", "disturbances=[missing,aliased]", "learners=[teacher,default,trace,hold,tree_memory]",
 )  # fmt: skip
+
+
+def settings(*overrides: str) -> Observability:
+    return cast(Observability, composed(study, *overrides))
 
 
 def test_an_undisturbed_teacher_drives_as_the_teacher() -> None:
@@ -36,17 +45,17 @@ def test_an_undisturbed_teacher_drives_as_the_teacher() -> None:
         return sim.Teacher()(seen[:, :3])
 
     own = drive(sim.Teacher())
-    for seen in (sim.Teacher(), Remembering(Learned(of_the_present, Memory((1, 4))))):
-        through = drive(Disturbed(undisturbed, seen))
+    for seen in (sim.Teacher(), WindowPolicy(of_the_present, Memory((1, 4)))):
+        through = drive(DisturbedPolicy(undisturbed, seen))
         np.testing.assert_array_equal(own.trajectory.sensors, through.trajectory.sensors)
 
 
-def lessons(commands: list[list[float]], counts: list[bool] | None = None) -> Lessons:
+def runs(commands: list[list[float]], moving: list[bool] | None = None) -> TeacherRuns:
     """One episode with these commands of the teacher, at readings in the middle of their ranges."""
     size = len(commands)
     readings = np.tile((LOW + HIGH) / 2, (size, 1))
-    counts = [True] * size if counts is None else counts
-    return Lessons(readings, np.array(commands), np.zeros(size, np.int64), np.arange(size), np.array(counts))
+    moving = [True] * size if moving is None else moving
+    return TeacherRuns(readings, np.array(commands), np.zeros(size, np.int64), np.arange(size), np.array(moving))
 
 
 STRAIGHT, LEFT, RIGHT = [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]
@@ -55,7 +64,7 @@ STRAIGHT, LEFT, RIGHT = [1.0, 1.0], [-1.0, 1.0], [1.0, -1.0]
 def test_agreement_counts_moments_and_balanced_agreement_counts_commands() -> None:
     # Before the lamp: six times straight, once left, once right. Who always drives straight is right six times of
     # eight, and for one command of three.
-    shown = lessons([*[STRAIGHT] * 6, LEFT, RIGHT, LEFT], [True] * 8 + [False])
+    shown = runs([*[STRAIGHT] * 6, LEFT, RIGHT, LEFT], [True] * 8 + [False])
     learned = Learned(lambda seen: np.tile(STRAIGHT, (len(seen), 1)))
     found = compare(learned, DISTURBANCES["missing"](0, 0), shown, every=1)
     assert (found.samples, found.agreement, found.usual_share) == (8, 0.75, 0.75)
@@ -63,19 +72,18 @@ def test_agreement_counts_moments_and_balanced_agreement_counts_commands() -> No
     assert compare(learned, DISTURBANCES["missing"](0, 0), shown, every=3).samples == 3
 
 
-def test_the_choice_is_thebest_on_validation_runs_and_is_told() -> None:
+def test_the_choice_is_the_best_on_validation_runs_and_is_told() -> None:
     def always(command: list[float]) -> Learned:
         return Learned(lambda seen: np.tile(command, (len(seen), 1)))
 
     undisturbed = [DISTURBANCES["missing"](0, 0)]
-    config = {"compare_every": 1}
-    material = Study(config, None, lessons([RIGHT]), lessons([LEFT, LEFT]), undisturbed)  # pyright: ignore[reportArgumentType]
-    chosen = best(material, {"right": lambda: always(RIGHT), "left": lambda: always(LEFT)})
+    task = Task(settings("compare_every=1"), None, runs([RIGHT]), runs([LEFT, LEFT]), undisturbed)  # pyright: ignore[reportArgumentType]
+    chosen = best(task, {"right": lambda: always(RIGHT), "left": lambda: always(LEFT)})
     assert chosen.tried == {"right": 0.0, "left": 1.0}
     np.testing.assert_array_equal(chosen.answer(np.zeros((1, 3))), [LEFT])
 
 
-def test_a_robot_that_senses_nothing_does_what_it_was_shown_most_often() -> None:
+def test_a_robot_that_senses_nothing_does_what_was_demonstrated_most_often() -> None:
     shown = Demonstrations(np.zeros((3, 3)), [LEFT, STRAIGHT, LEFT])
 
     class Blind:
@@ -84,12 +92,12 @@ def test_a_robot_that_senses_nothing_does_what_it_was_shown_most_often() -> None
             commands[0] = 1.0
             return type("Recall", (), {"commands": commands})
 
-    asked = Asked(Blind(), shown)  # pyright: ignore[reportArgumentType]
-    np.testing.assert_array_equal(asked(np.full((2, 3), np.nan)), [STRAIGHT, LEFT])
+    answer = ProgramAnswer(Blind(), shown)  # pyright: ignore[reportArgumentType]
+    np.testing.assert_array_equal(answer(np.full((2, 3), np.nan)), [STRAIGHT, LEFT])
 
 
 def test_demonstrations_leave_out_moments_without_any_reading() -> None:
-    shown = lessons([STRAIGHT] * 400)
+    shown = runs([STRAIGHT] * 400)
     lost = DISTURBANCES["missing"](0.7, 0)
     seen = sim.replay(lost, shown.readings, shown.episodes)
     found = shown.demonstrations([lost], Memory((1,)))
@@ -114,12 +122,12 @@ def test_sentences_follow_from_the_numbers() -> None:
         row("default", 0.0, 1.0, 1.0), row("default", 0.5, 0.5, None), row("default", 0.8, 0.3, 0.1),
         row("disturbed", 0.5, 0.7, None), row("disturbed", 0.8, 0.5, 0.1), row("trace", 0.8, 0.5, 0.6),
     ]  # fmt: skip
-    assert mean_over(table, "missing", "default", "balanced_agreement") == pytest.approx(0.4)
-    assert mean_over(table, "missing", "tree", "success_rate") is None
-    told = sentences(table)["missing"]
-    assert "raised from 0.40 to 0.60 by showing" in told
+    assert means(table, "missing", "balanced_agreement")["default"] == pytest.approx(0.4)
+    assert means([row("tree", 0.5, 0.7, None)], "missing", "success_rate") == {}
+    told = sentence(table, "missing")
+    assert "raised from 0.40 to 0.60 by learning" in told
     assert "lowered from 0.60 to 0.50 by `trace`" in told
-    assert "Success rate: highest for `trace` (0.60); unchanged (0.10) by showing" in told
+    assert "Success rate: highest for `trace` (0.60); unchanged (0.10) by learning" in told
 
 
 def test_the_figure_shows_success_only_if_somebody_drove() -> None:
@@ -138,33 +146,62 @@ def test_the_figure_shows_success_only_if_somebody_drove() -> None:
     assert titles(0.5) == ["balanced agreement", "agreement", "success rate"]
 
 
-def test_what_is_not_there_is_named() -> None:
-    config: dict[str, Any] = {
-        "learners": ["default"], "disturbances": ["missing"], "strengths": {"missing": [0, 0.5]}, "demonstrations": 1,
-        "validation": 1, "heldout": 1, "compare_every": 1, "starts": 0, "lags": [[1]], "leaves": [5],
-    }  # fmt: skip
-    check(config)
-    for change, words in (
-        ({"learners": ["nobody"]}, "learners: there is no 'nobody'"),
-        ({"disturbances": ["fog"]}, "disturbances: there is no 'fog'"),
-        ({"disturbances": ["missing", "missing"]}, "disturbances names 'missing' 2 times"),
-        ({"learners": []}, "learners is empty; choose from teacher, "),
-        ({"strengths": {"missing": [0.5]}}, "strengths.missing grow from 0"),
-        ({"strengths": {"missing": [0, 2]}}, "from 0 to 1; got 2"),
-        ({"starts": -1}, "starts=-1: expected 0 or more"),
-        ({"heldout": 0}, "heldout=0: expected 1 or more"),
-        ({"lags": []}, "lags is empty"),
-        ({"lags": [[2, 1]]}, "increasing whole numbers of steps"),
-    ):
-        with pytest.raises(ValueError, match=words):
-            check(config | change)
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("learners=[nobody]", "learners: there is no 'nobody'; choose from teacher, "),
+        ("disturbances=[fog]", "disturbances: there is no 'fog'"),
+        ("disturbances=[missing,missing]", "disturbances names 'missing' 2 times"),
+        ("learners=[]", "learners is empty; choose from teacher, "),
+        ("strengths.missing=[0.5]", "strengths.missing grow from 0"),
+        ("strengths.missing=[0,2]", r"strengths.missing=\[0,2\]: expected a number from 0 to 1"),
+        ("strengths.noisy=[]", "strengths.noisy is empty"),
+        ("strengths.aliased=[0,9]", "strengths.aliased: there is no 9; choose from 0, 1, 2, 3, 4"),
+        ("starts=-1", "starts=-1: expected 0 or more"),
+        ("heldout=0", "heldout=0: expected 1 or more"),
+        ("lags=[]", "lags is empty"),
+        ("lags=[[2,1]]", "increasing whole numbers of steps"),
+        ("leaves=[0]", "leaves="),
+        ("rule.name=guess", "no learning rule 'guess'"),
+    ],
+)
+def test_what_is_not_there_is_named(override: str, words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check_all(study, settings(override))
+
+
+def test_a_rule_that_cannot_train_the_architecture_is_refused() -> None:
+    with pytest.raises(ValueError, match="the rule least_squares cannot train programs of HRR"):
+        check_all(study, settings("vsa=hrr", "rule=least_squares"))
+
+
+def test_a_delay_of_part_of_a_step_is_told_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command changes
+    with pytest.raises(SystemExit) as exit_:
+        main(["observability", "strengths.delayed=[0,0.5]"])
+    assert exit_.value.code == 1
+    error = capsys.readouterr().err
+    assert error.startswith("observability: strengths.delayed")
+    assert error.endswith("=0.5: expected a whole number\n")
+    assert error.count("\n") == 1
+    assert not list(tmp_path.rglob("results.json"))
+
+
+def test_the_slowest_cells_come_first_and_memories_of_gaps_only_where_there_are_gaps() -> None:
+    found = cells(settings("disturbances=[missing,noisy]", "learners=[teacher,trace,held_trace,tree]"))
+    names = [(cell["disturbance"], cell["learner"]) for cell in found]
+    assert set(names[:3]) == {("missing", "trace"), ("missing", "held_trace"), ("noisy", "trace")}
+    assert len(names) == 7
 
 
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A tiny run."""
     folder = tmp_path_factory.mktemp("observability")
-    assert "balanced" in output_of(folder, *SMALL, "workers=1", module="experiments.observability")
+    assert "balanced" in output_of(folder, "observability", *SMALL, "workers=1", module="experiments")
     return folder
 
 
@@ -189,9 +226,18 @@ def test_the_command_writes_what_it_promises(finished: Path) -> None:
         place = f"{key[0]}.{key[1]:g}.{key[2]}"
         assert content["metrics"][f"{place}.success_rate"] == figures["success_rate"]
         low, high = sim.wilson(round(figures["success_rate"] * 4), 4)
-        assert (figures["success_low"], figures["success_high"]) == (low, high)
+        assert (figures["success_low"], figures["success_high"]) == pytest.approx((low, high))
     records = pq.read_table(only(finished, "records.parquet")).to_pylist()
-    assert len(records) == len(rows) * 4
+    assert len([record for record in records if record["choice"] is None]) == len(rows) * 4
+    for (disturbance, strength, learner), figures in rows.items():
+        own = [
+            record
+            for record in records
+            if (record["disturbance"], record["strength"], record["learner"]) == (disturbance, strength, learner)
+        ]
+        assert [record["episode"] for record in own] == [0, 1, 2, 3]
+        assert figures["success_rate"] * 4 == sum(record["success"] for record in own)
+        assert figures["escape_rate"] * 4 == sum(record["escaped"] for record in own)
     assert only(finished, "observability.png").stat().st_size > 10_000
 
 
@@ -208,14 +254,16 @@ def test_the_memory_with_the_highest_validation_figure_is_the_one_of_the_rows(fi
 
 
 def test_the_same_seed_gives_the_same_results_in_other_batches(finished: Path, tmp_path: Path) -> None:
-    output_of(tmp_path, *SMALL, "workers=2", "robots=1", module="experiments.observability")
-    ours, theirs = results(finished), results(tmp_path)
-    assert ours["table"] == theirs["table"]
-    assert ours["metrics"] == theirs["metrics"]
+    again = run(study, settings(*SMALL, "workers=1", "robots=1"), tmp_path, Console(file=io.StringIO()))
+    before = results(finished)
+    assert again.table == before["table"]
+    assert again.metrics == before["metrics"]
 
 
-def test_an_error_is_one_line(tmp_path: Path) -> None:
-    run = corral(tmp_path, "learners=[nobody]", module="experiments.observability")
-    assert run.returncode == 1
-    assert run.stderr.startswith("observability: learners: there is no 'nobody'; choose from teacher, ")
-    assert run.stderr.count("\n") == 1
+def test_without_starts_agreement_is_all_that_is_measured(tmp_path: Path) -> None:
+    chosen = ("starts=0", "disturbances=[missing]", "learners=[teacher,tree]", "workers=1")
+    outcome = run(study, settings(*SMALL, *chosen), tmp_path, Console(file=io.StringIO()))
+    assert [(row["learner"], row["episodes"], row["success_rate"]) for row in outcome.table] == [
+        (learner, 0, None) for learner in ("teacher", "teacher", "tree", "tree")
+    ]
+    assert "could not be drawn" not in (tmp_path / "report.html").read_text()

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim
-from experiments.observability_disturbances import DISTURBANCES, HIGH, LOW, Stuck, mixed
+from experiments.observability.disturbances import DISTURBANCES, HIGH, LOW, Stuck, disturb_in_turns
 
 
 def recording(episodes: int = 6, steps: int = 80) -> tuple[Any, Any, Any]:
@@ -51,7 +51,7 @@ def test_the_share_of_missing_readings_is_the_one_asked_for_and_all_else_arrives
 
 
 @pytest.mark.parametrize("delay", [1, 5])
-def test_a_delayed_reading_is_the_one_so_many_steps_before(delay: int) -> None:
+def test_a_delayed_reading_is_the_one_some_steps_before(delay: int) -> None:
     readings, episodes, steps = recording()
     seen = sim.replay(DISTURBANCES["delayed"](delay, 0), readings, episodes)
     rows = np.arange(len(readings))
@@ -85,17 +85,8 @@ def test_noise_has_the_asked_spread_and_stays_in_range() -> None:
 
 def test_disturbances_take_turns_by_episode() -> None:
     readings, episodes, _ = recording(4)
-    seen = mixed([DISTURBANCES["aliased"](0, 0), DISTURBANCES["aliased"](4, 0)], readings, episodes)
+    seen = disturb_in_turns([DISTURBANCES["aliased"](0, 0), DISTURBANCES["aliased"](4, 0)], readings, episodes)
     gone = np.isnan(seen)
     assert not gone[(episodes == 3) | (episodes == 5)].any()
     assert gone[(episodes == 4) | (episodes == 6)][:, :2].all()
     assert not gone[:, 2].any()
-
-
-@pytest.mark.parametrize(
-    ("disturbance", "strength", "words"),
-    [("missing", 1.5, "from 0 to 1"), ("delayed", 0.5, "whole number"), ("aliased", 9, "one of 0: none, 1: distance")],
-)
-def test_meaningless_strengths_are_refused(disturbance: str, strength: float, words: str) -> None:
-    with pytest.raises(ValueError, match=words):
-        DISTURBANCES[disturbance](strength, 0)

@@ -1,7 +1,6 @@
 """The damage study: what is damaged is exactly what was asked for, and the command reports it."""
 
 import io
-import sys
 from functools import cache
 from pathlib import Path
 from typing import Any, cast
@@ -11,18 +10,18 @@ import pyarrow.parquet as pq
 import pytest
 import torch
 from commands import only, output_of, results
-from hydra import compose, initialize_config_module
-from omegaconf import OmegaConf
+from kits import composed
 from rich.console import Console
 
 import sim
 from behaviours import Demonstrations
-from experiments import robustness
-from experiments.damage import DAMAGES, PARTS, Array, Damage, Learner
-from experiments.damaged_programs import Programmed
-from experiments.damaged_rivals import Network, Tree
-from experiments.robustness import LEARNERS, Case, Shared, check
-from experiments.robustness_report import answers, survival
+from experiments.kit.run import check_all, load, run
+from experiments.main import main
+from experiments.robustness.baselines import DamagedNetwork, DamagedTree, Network, Tree, positions
+from experiments.robustness.damage import DAMAGES, PARTS, Array, Damage, Learner
+from experiments.robustness.page import answers, survival
+from experiments.robustness.programs import Program
+from experiments.robustness.study import LEARNERS, Robustness, SharedStarts, cells, study
 
 SMALL = ("vsa.dim=500", "encoder.bins=8", "encoder.span=2", "one_shot.encoder.bins=8", "mlp_epochs=15", "hidden=8")
 READINGS = np.random.default_rng(5).uniform([0, 0, 0], [sensor.high for sensor in sim.SENSORS], (300, 3))
@@ -30,15 +29,13 @@ READINGS[:150, 0] = sim.SENSORS[0].high  # dark to the left, to the right, to bo
 READINGS[80:220, 1] = sim.SENSORS[1].high
 
 
-def settings(*overrides: str) -> dict[str, Any]:
-    with initialize_config_module("experiments.conf", version_base="1.3"):
-        config = compose("robustness", [*SMALL, *overrides])
-    return cast(dict[str, Any], OmegaConf.to_container(config, resolve=True))
+def settings(*overrides: str) -> Robustness:
+    return cast(Robustness, composed(study, *SMALL, *overrides))
 
 
 @cache
 def learner(name: str) -> Learner:
-    return LEARNERS[name](settings(), Demonstrations(READINGS, sim.Teacher()(READINGS)))
+    return LEARNERS[name].learn(settings(), Demonstrations(READINGS, sim.Teacher()(READINGS)))
 
 
 def damage(kind: str, share: float, *seed: int) -> Damage:
@@ -89,39 +86,39 @@ def test_the_same_seed_damages_the_same_and_a_larger_share_damages_more_of_it() 
 def test_no_damage_changes_nothing(name: str, part: str) -> None:
     one = learner(name)
     for kind in DAMAGES:
-        commands = one.commands(part, damage(kind, 0.0), READINGS)
-        if isinstance(one, Programmed):
+        commands = one.damaged(part, damage(kind, 0.0))(READINGS)
+        if isinstance(one, Program):
             expected = one.behaviour(READINGS).commands.numpy()
         elif isinstance(one, Network):
             expected = one.classes[np.asarray(one.model.predict_proba((READINGS - one.mean) / one.scale)).argmax(-1)]
         else:
             assert isinstance(one, Tree)
-            expected = one.classes[np.asarray(one.model.predict((READINGS - one.low) / one.span), dtype=np.int64)]
+            expected = one.classes[np.asarray(one.model.predict(positions(READINGS)), dtype=np.int64)]
         assert np.array_equal(commands, expected)
 
 
 @pytest.mark.parametrize(("name", "part"), CASES)
 @pytest.mark.parametrize("kind", DAMAGES)
-def test_a_damaged_learner_drives_as_it_was_examined(name: str, part: str, kind: str) -> None:
+def test_an_answer_does_not_depend_on_what_is_asked_together(name: str, part: str, kind: str) -> None:
     one, what = learner(name), damage(kind, 0.4)
-    asked = one.commands(part, what, READINGS)
+    together = one.damaged(part, what)(READINGS)
     policy = one.damaged(part, what)
     alone = np.concatenate([policy(row[None]) for row in READINGS[:150]])
-    assert np.array_equal(alone, asked[:150])
+    assert np.array_equal(alone, together[:150])
 
 
 @pytest.mark.parametrize("part", PARTS)
 def test_heavy_damage_is_felt(part: str) -> None:
     one = learner("default")
     right = sim.Teacher()(READINGS)
-    shares = [(one.commands(part, damage("flip", s), READINGS) == right).all(1).mean() for s in (0.0, 0.5)]
+    shares = [(one.damaged(part, damage("flip", s))(READINGS) == right).all(1).mean() for s in (0.0, 0.5)]
     assert shares[1] < shares[0] - 0.15
 
 
 @pytest.mark.parametrize("part", ["program", "query"])
 def test_flipping_all_of_the_program_or_the_query_turns_the_order_of_the_results_around(part: str) -> None:
     one = learner("default")
-    assert isinstance(one, Programmed)
+    assert isinstance(one, Program)
     bins = one.space.cells(READINGS)
     scores = torch.stack(
         [one.space.encode(bins).double() @ (one.behaviour.program * item).double() for item in one.items], -1
@@ -134,7 +131,7 @@ def test_flipping_all_of_the_program_or_the_query_turns_the_order_of_the_results
 
 def test_the_codebooks_of_others_stay_whole_and_missing_readings_keep_their_entry() -> None:
     one = learner("default")
-    assert isinstance(one, Programmed)
+    assert isinstance(one, Program)
     before = one.space.encoder.table.clone(), one.items.clone()
     damaged = one.damaged("codebooks", damage("noise", 0.25))
     assert torch.equal(one.space.encoder.table, before[0])
@@ -147,7 +144,7 @@ def test_the_codebooks_of_others_stay_whole_and_missing_readings_keep_their_entr
 
 def test_each_condition_is_damaged_in_its_own_way() -> None:
     one = learner("default")
-    assert isinstance(one, Programmed)
+    assert isinstance(one, Program)
     bins = one.space.cells(READINGS)
     query = one.damaged("query", damage("flip", 0.45))
     # Asked in another order and company, each condition gets the same answer.
@@ -155,28 +152,35 @@ def test_each_condition_is_damaged_in_its_own_way() -> None:
     assert (query.results(bins) != one.damaged("query", damage("flip", 0.45, 1, 1)).results(bins)).any()
 
 
-@pytest.mark.parametrize("name", ["mlp", "decision_tree"])
-def test_the_elements_of_the_others_are_all_their_parameters(name: str) -> None:
-    one = learner(name)
-    if isinstance(one, Network):
-        assert one.elements("parameters") == 3 * 8 + 8 + 8 * 3 + 3
-        policy = cast(Any, one.damaged("parameters", damage("zero", 0.5)))
-        zeros = sum(int((layer == 0).sum()) for layer in policy.layers)
-        assert zeros - sum(int((layer == 0).sum()) for layer in one.layers) == 30
-    else:
-        tree = cast(Tree, one)
-        assert one.elements("parameters") == tree.tree.node_count
-        policy = cast(Any, one.damaged("parameters", damage("flip", 1.0)))
-        assert policy.thresholds[tree.inner] == pytest.approx(1 - np.array(tree.tree.threshold)[tree.inner])
-        # Every leaf decides otherwise.
-        undamaged = cast(Any, one.damaged("parameters", damage("flip", 0.0)))
-        assert (policy.answers[tree.leaves] != undamaged.answers[tree.leaves]).any(1).all()
+def test_the_elements_of_a_network_are_all_its_weights_and_biases() -> None:
+    one = learner("mlp")
+    assert isinstance(one, Network)
+    assert one.elements("parameters") == 3 * 8 + 8 + 8 * 3 + 3
+    policy = one.damaged("parameters", damage("zero", 0.5))
+    assert isinstance(policy, DamagedNetwork)
+    zeros = sum(int((layer == 0).sum()) for layer in policy.layers)
+    assert zeros - sum(int((layer == 0).sum()) for layer in one.layers) == 30
+
+
+def test_the_elements_of_a_tree_are_its_thresholds_and_its_leaves() -> None:
+    one = learner("decision_tree")
+    assert isinstance(one, Tree)
+    whole = one.model.tree_
+    assert one.elements("parameters") == whole.node_count
+    policy = one.damaged("parameters", damage("flip", 1.0))
+    assert isinstance(policy, DamagedTree)
+    flipped = policy.model.tree_
+    assert flipped.threshold[one.inner] == pytest.approx(1 - np.array(whole.threshold)[one.inner])
+    # Every leaf decides otherwise, and the tree that was learned stays whole.
+    decisions = [np.array(tree.value[one.leaves, 0]).argmax(-1) for tree in (flipped, whole)]
+    assert (decisions[0] != decisions[1]).all()
+    assert (np.array(whole.value[:, 0]) >= 0).all()
 
 
 def test_copies_share_the_starts() -> None:
     one = learner("default")
     copies = [one.damaged("program", damage("flip", 0.5, 0, draw)) for draw in range(2)]
-    together = sim.replay(Shared(copies), READINGS, np.arange(len(READINGS)))
+    together = sim.replay(SharedStarts(copies), READINGS, np.arange(len(READINGS)))
     assert np.array_equal(together[0::2], copies[0](READINGS[0::2]))
     assert np.array_equal(together[1::2], copies[1](READINGS[1::2]))
     assert (together[0::2] != copies[1](READINGS[0::2])).any()
@@ -185,29 +189,50 @@ def test_copies_share_the_starts() -> None:
 @pytest.mark.parametrize(
     ("override", "words"),
     [
-        ("learners=[nobody]", "learners: there is no 'nobody'"),
-        ("parts=[]", "parts is empty; choose from "),
+        ("learners=[nobody]", "learners: there is no 'nobody'; choose from default, "),
+        ("parts=[]", "parts is empty; choose from program, "),
         ("damages=[flip,flip]", "damages names 'flip' 2 times"),
-        ("shares=[0.1,0.2]", "begin with 0"),
-        ("shares=[0,1.5]", "at most 1"),
-        ("drive_shares=[0.15]", "0.15"),
-        ("draws=0", "draws is at least 1"),
+        ("damages=[melt]", "damages: there is no 'melt'; choose from flip, zero, noise"),
+        ("shares=[0.1,0.2]", "shares begin with 0"),
+        ("shares=[0,1.5]", r"shares=\[0,1.5\]: expected a number from 0 to 1"),
+        ("drive_shares=[0.15]", r"drive_shares are some of the shares .*0.15"),
+        ("draws=0", "draws=0: expected 1 or more"),
+        ("kept=0", "kept=0: expected more than 0 and at most 1"),
+        # Programs without signs, a rule that does not fit, and codes without a table.
+        ("vsa=bsc", "BSC has none; try vsa=map_c"),
+        ("one_shot.rule.name=guess", "no learning rule 'guess'"),
+        ("record=threshold_features", "threshold_features has none .* try encoder=level record=product"),
     ],
 )
 def test_wrong_settings_are_named(override: str, words: str) -> None:
-    with pytest.raises(ValueError, match=words.replace("[", r"\[")):
-        check(settings(override))
+    with pytest.raises(ValueError, match=words):
+        check_all(study, settings("learners=[default,one_shot]", override))
 
 
-def test_architectures_without_signs_are_refused() -> None:
-    with pytest.raises(ValueError, match="BSC"):
-        LEARNERS["hand_written"](settings("vsa=bsc"), Demonstrations(READINGS, sim.Teacher()(READINGS)))
+def test_a_rule_that_cannot_train_the_architecture_is_refused() -> None:
+    with pytest.raises(ValueError, match="the rule least_squares cannot train programs of HRR"):
+        check_all(study, settings("vsa=hrr", "rule=least_squares"))
+
+
+def test_an_undamaged_learner_is_measured_once_and_robots_drive_first() -> None:
+    found = cells(settings("learners=[default,mlp]", "shares=[0,0.1,0.3]", "drive_shares=[0,0.3]"))
+    assert [cell["learner"] for cell in found if not cell["share"]] == ["teacher", "default", "mlp"]
+    driven = [cell["share"] in (0, 0.3) for cell in found]
+    assert driven == sorted(driven, reverse=True)
+    assert len(found) == 3 + (3 + 1) * 3 * 2
 
 
 def test_what_is_survived_follows_from_the_numbers() -> None:
     values = {0.0: 0.9, 0.1: 0.88, 0.2: 0.5, 0.3: 0.89}
     table: list[dict[str, Any]] = [
-        {**vars(Case("default", "program", "flip", share)), "agreement": value, "success_rate": None}
+        {
+            "learner": "default",
+            "part": "program",
+            "damage": "flip",
+            "share": share,
+            "agreement": value,
+            "success_rate": None,
+        }
         for share, value in values.items()
     ]
     (row,) = survival(table, kept=0.95)
@@ -237,13 +262,15 @@ TINY = (
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("robustness")
-    return folder, output_of(folder, *TINY, module="experiments.robustness")
+    return folder, output_of(folder, "robustness", *TINY, module="experiments")
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:
     folder, printed = finished
     content = results(folder)
-    rows = {(row["learner"], row["part"], row["share"]): row for row in content["table"]}
+    assert content["table"][0]["learner"] == "teacher"
+    assert content["metrics"]["teacher.success_rate"] == content["table"][0]["success_rate"]
+    rows = {(row["learner"], row["part"], row["share"]): row for row in content["table"][1:]}
     assert list(rows) == [
         (name, part, share)
         for name, part in (("default", "program"), ("decision_tree", "parameters"))
@@ -259,19 +286,25 @@ def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -
         assert row["success_rate"] * 4 == sum(r["successes"] for r in own)
         assert all(r["damaged"] == int(share * r["elements"] + 0.5) for r in own)
         assert content["metrics"][f"{name}.{part}.flip.{share:g}.agreement"] == row["agreement"]
+        assert content["metrics"][f"{name}.{part}.elements"] == own[0]["elements"]
     assert rows["decision_tree", "parameters", 0.0]["agreement"] > 0.9
     assert rows["default", "program", 0.5]["agreement"] < rows["default", "program", 0.0]["agreement"]
     assert "results.json" in printed
     page = only(folder, "report.html").read_text()
-    assert page.count("data:image/png;base64,") == 2
+    assert page.count("data:image/png;base64,") == 3
     assert {path.name for path in folder.rglob("*.png")} == {"agreement.png", "success_rate.png", "robustness.png"}
+    assert "Shares that are survived" in page
+    assert "How much there is to damage" in page
 
 
-def test_the_same_seed_gives_the_same_results(finished: tuple[Path, str], tmp_path: Path) -> None:
-    again = robustness.study(settings(*TINY, "robots=3"), tmp_path, Console(file=io.StringIO()))
+def test_the_same_seed_gives_the_same_results_in_other_batches(finished: tuple[Path, str], tmp_path: Path) -> None:
+    config = settings(*TINY, "robots=3")
+    again = run(study, config, tmp_path, Console(file=io.StringIO()))
     before = results(finished[0])
     assert again.table == before["table"]
     assert again.metrics == before["metrics"]
+    # The page can be drawn from the files alone.
+    assert load(tmp_path)[1].table == again.table
 
 
 def test_a_wrong_setting_is_told_in_one_line(
@@ -279,9 +312,8 @@ def test_a_wrong_setting_is_told_in_one_line(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command changes
-    monkeypatch.setattr(sys, "argv", ["robustness", "damages=[melt]"])
     with pytest.raises(SystemExit) as exit_:
-        robustness.main()
+        main(["robustness", "damages=[melt]"])
     assert exit_.value.code == 1
     assert capsys.readouterr().err == "robustness: damages: there is no 'melt'; choose from flip, zero, noise\n"
     assert not list(tmp_path.rglob("results.json"))

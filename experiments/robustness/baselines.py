@@ -1,21 +1,21 @@
 """The learners without hypervectors, an MLP and a decision tree, whose parameters are damaged."""
 
+import copy
 import warnings
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPClassifier
 from sklearn.tree import DecisionTreeClassifier
 
 import sim
 from behaviours import Demonstrations
-from experiments.damage import Array, Damage, Damaged, Floats, Learner
+from experiments.robustness.damage import Array, Damage, Floats
 
 
-class Network(Learner):
+class Network:
     """An MLP with one hidden layer on standardised readings; its parameters are all weights and biases."""
 
     def __init__(self, train: Demonstrations, seed: int, hidden: int, epochs: int) -> None:
@@ -34,74 +34,69 @@ class Network(Learner):
         """See `Learner.elements`."""
         return sum(layer.size for layer in self.layers)
 
-    def damaged(self, part: str, damage: Damage) -> Damaged:
+    def damaged(self, part: str, damage: Damage) -> "DamagedNetwork":
         """See `Learner.damaged`."""
         values = damage([Array(layer.ravel()) for layer in self.layers])
         layers = [value.reshape(layer.shape) for value, layer in zip(values, self.layers, strict=True)]
-        return _NetworkPolicy(self.mean, self.scale, layers, self.classes)
+        return DamagedNetwork(self.mean, self.scale, layers, self.classes)
 
 
 @dataclass(frozen=True)
-class _NetworkPolicy:
+class DamagedNetwork:
+    """The same computation with other weights."""
+
     mean: Floats
     scale: Floats
     layers: list[Floats]
     classes: Floats
 
     def __call__(self, sensors: Floats) -> Floats:
+        """Commands `[B, 2]` for readings `[B, 3]`."""
         weights_in, weights_out, bias_in, bias_out = self.layers
         hidden = np.maximum((sensors - self.mean) / self.scale @ weights_in + bias_in, 0.0)
         return self.classes[(hidden @ weights_out + bias_out).argmax(-1)]
 
 
-class Tree(Learner):
+class Tree:
     """A decision tree; its parameters are the thresholds and the decisions of its leaves.
 
-    A threshold is a place in its sensor's range, from 0 to 1: flipped it is mirrored within the range, zero is the low
-    end. A leaf's decision is one element, the scores of its commands (the shares of its samples): flipped they are
+    A threshold is a position in its sensor's range, from 0 to 1: flipped it is mirrored within the range, zero is the
+    low end. A leaf's decision is one element, the scores of its commands (the shares of its samples): flipped they are
     negated, so that another command wins; without any score the first command does.
     """
 
     def __init__(self, train: Demonstrations, seed: int) -> None:
         self.classes, labels = np.unique(train.commands.numpy(), axis=0, return_inverse=True)
-        self.low, high = np.array([(sensor.low, sensor.high) for sensor in sim.SENSORS]).T
-        self.span = high - self.low
-        places = (train.sensors.numpy() - self.low) / self.span
-        self.model = DecisionTreeClassifier(random_state=seed).fit(places, labels.ravel())
-        self.tree: Any = self.model.tree_
-        self.inner = np.flatnonzero(self.tree.children_left >= 0)
-        self.leaves = np.flatnonzero(self.tree.children_left < 0)
+        self.model = DecisionTreeClassifier(random_state=seed).fit(positions(train.sensors.numpy()), labels.ravel())
+        children = self.model.tree_.children_left
+        self.inner, self.leaves = np.flatnonzero(children >= 0), np.flatnonzero(children < 0)
 
     def elements(self, part: str) -> int:
         """See `Learner.elements`."""
         return len(self.inner) + len(self.leaves)
 
-    def damaged(self, part: str, damage: Damage) -> Damaged:
+    def damaged(self, part: str, damage: Damage) -> "DamagedTree":
         """See `Learner.damaged`."""
-        thresholds = np.array(self.tree.threshold, dtype=np.float64)
-        decisions = np.array(self.tree.value[:, 0], dtype=np.float64)
+        model = copy.deepcopy(self.model)
+        thresholds, decisions = model.tree_.threshold, model.tree_.value[:, 0]  # views: writing changes the tree
         arrays = [Array(thresholds[self.inner], mirror=1.0), Array(decisions[self.leaves])]
         thresholds[self.inner], decisions[self.leaves] = damage(arrays)
-        children = np.stack([self.tree.children_left, self.tree.children_right])
-        answers = self.classes[decisions.argmax(-1)]
-        return _TreePolicy(self.low, self.span, np.array(self.tree.feature), children, thresholds, answers)
+        return DamagedTree(model, self.classes)
 
 
 @dataclass(frozen=True)
-class _TreePolicy:
-    low: Floats
-    span: Floats
-    feature: NDArray[np.int64]
-    children: NDArray[np.int64]
-    thresholds: Floats
-    answers: Floats
+class DamagedTree:
+    """A tree whose arrays were changed in place."""
+
+    model: Any
+    classes: Floats
 
     def __call__(self, sensors: Floats) -> Floats:
-        # The tree compares in single precision, and its thresholds lie between readings of that precision.
-        places = ((sensors - self.low) / self.span).astype(np.float32)
-        node = np.zeros(len(places), dtype=np.int64)
-        rows = np.arange(len(places))
-        while (inner := self.children[0, node] >= 0).any():
-            right = places[rows, self.feature[node]] > self.thresholds[node]
-            node = np.where(inner, self.children[right.astype(np.int64), node], node)
-        return self.answers[node]
+        """Commands `[B, 2]` for readings `[B, 3]`."""
+        return self.classes[self.model.predict(positions(sensors))]
+
+
+def positions(sensors: Floats) -> Floats:
+    """Readings as positions in their sensors' ranges, from 0 to 1."""
+    low, high = np.array([(channel.low, channel.high) for channel in sim.SENSORS]).T
+    return (sensors - low) / (high - low)

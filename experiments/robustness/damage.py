@@ -1,6 +1,5 @@
 """Damage to a share of the elements of something that has learned."""
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -10,10 +9,11 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-DAMAGES = ("flip", "zero", "noise")
-PARTS = ("program", "codebooks", "query")
+DAMAGES = {"flip": "sign flipped", "zero": "set to zero", "noise": "Gaussian noise added"}
+PARTS = {"program": "the program", "codebooks": "the codebooks", "query": "the query"}
+"""The parts of a learner that has hypervectors."""
 PARAMETERS = "parameters"
-"""The one part of a learner that has no hypervectors."""
+"""The one part of a learner that has none."""
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Damage:
     """What happens to a share of the elements, and to which of them.
 
     The elements are drawn from `seed` alone, so a larger share hits those of a smaller one and more, and all kinds hit
-    the same ones. `noise` is the standard deviation in root mean squares of the array that an element lies in.
+    the same ones. `noise` is the standard deviation in root mean squares of the array that an element is in.
     """
 
     kind: str
@@ -69,19 +69,13 @@ class Damaged(Protocol):
         ...
 
 
-class Learner(ABC):
+class Learner(Protocol):
     """Something that has learned, of which a part can be damaged."""
 
-    parts: tuple[str, ...] = (PARAMETERS,)
-
-    @abstractmethod
     def elements(self, part: str) -> int:
         """How many elements the part has."""
+        ...
 
-    @abstractmethod
     def damaged(self, part: str, damage: Damage) -> Damaged:
         """A copy of which `part` is damaged."""
-
-    def commands(self, part: str, damage: Damage, sensors: Floats) -> Floats:
-        """What that copy commands at each reading."""
-        return self.damaged(part, damage)(sensors)
+        ...

@@ -1,4 +1,4 @@
-"""What the learners of the observability study are shown: the teacher's runs, as seen through disturbances."""
+"""What learners see of the teacher's runs: disturbed readings, with or without a memory of past ones."""
 
 from __future__ import annotations
 
@@ -13,14 +13,17 @@ from torch import Tensor
 
 import sim
 from behaviours import Demonstrations
-from experiments.lessons import shown_in
-from experiments.observability_disturbances import Disturbance, Floats, Integers, mixed
+from experiments.observability.disturbances import Disturbance, Floats, Integers, disturb_in_turns
+from experiments.tasks.corral import shown_in
 from torchvsa.encoders.history import no_past, window, windows
 
 
 @dataclass(frozen=True)
 class Memory:
-    """Which readings a learner sees beside the present ones: those `lags` steps ago; gaps filled if it can `hold`."""
+    """Which readings a learner sees: the present ones and those `lags` steps ago.
+
+    With `hold`, the last reading that arrived replaces one that is missing.
+    """
 
     lags: tuple[int, ...] = ()
     hold: bool = False
@@ -41,36 +44,36 @@ class Memory:
 
 
 @dataclass(frozen=True)
-class Lessons:
-    """Recorded runs of the teacher: true readings `[N, n]`, its commands `[N, m]`, and whose they are.
+class TeacherRuns:
+    """Recorded runs of the teacher: true readings `[N, n]`, its commands `[N, m]`, episodes and steps `[N]`.
 
-    `counts` `[N]`: before the lamp was reached. A robot at rest repeats one condition and would flatter every learner,
-    so that only these are compared; what it does at the lamp is to be learned all the same.
+    `moving` `[N]`: before the lamp was reached. A robot at rest repeats one condition and would flatter every learner,
+    so only these steps are compared; what it does at the lamp is learned all the same.
     """
 
     readings: Floats
     commands: Floats
     episodes: Integers
     steps: Integers
-    counts: NDArray[np.bool_]
+    moving: NDArray[np.bool_]
 
     @classmethod
-    def of(cls, rollout: sim.Rollout) -> Lessons:
+    def of(cls, rollout: sim.Rollout) -> TeacherRuns:
         """All control steps of a recorded rollout."""
-        shown, moving = shown_in(rollout)
+        steps, moving = shown_in(rollout)
         return cls(
-            shown.sensors.numpy(), shown.commands.numpy(), shown.episodes.numpy(), rollout.trajectory.step, moving
+            steps.sensors.numpy(), steps.commands.numpy(), steps.episodes.numpy(), rollout.trajectory.step, moving
         )
 
-    def seen(self, disturbances: Sequence[Disturbance], memory: Memory) -> Float64[Tensor, "N w"]:
-        """What a learner with that memory sees of them; the disturbances take turns, one an episode."""
-        disturbed = mixed(disturbances, self.readings, self.episodes)
+    def windows(self, disturbances: Sequence[Disturbance], memory: Memory) -> Float64[Tensor, "N w"]:
+        """What a learner with this memory sees of them; the disturbances take turns, one per episode."""
+        disturbed = disturb_in_turns(disturbances, self.readings, self.episodes)
         return windows(torch.from_numpy(disturbed), torch.from_numpy(self.episodes), memory.lags, memory.hold)
 
     def demonstrations(self, disturbances: Sequence[Disturbance], memory: Memory) -> Demonstrations:
         """The samples to learn from: those with at least one reading. Raises `ValueError` if there is none."""
-        seen = self.seen(disturbances, memory)
-        keep = ~seen.isnan().all(-1)
-        if not keep.any():
+        seen = self.windows(disturbances, memory)
+        observed = ~seen.isnan().all(-1)
+        if not observed.any():
             raise ValueError("no sensor was observed in any demonstration; choose weaker disturbances")
-        return Demonstrations(seen, self.commands, self.episodes).where(keep)
+        return Demonstrations(seen, self.commands, self.episodes).where(observed)

@@ -19,6 +19,7 @@ from experiments.models import draws
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 NAMES = [sensor.name for sensor in sim.SENSORS]
 LOW = np.array([sensor.low for sensor in sim.SENSORS])
@@ -35,17 +36,10 @@ class Disturbance(ABC):
     axis: ClassVar[str]
     """What strength means, with its unit."""
     gaps: ClassVar[bool] = False
-    """Whether readings go missing and come back, so that the last that arrived can stand for them."""
+    """Whether readings go missing and come back, so that the last that arrived can replace them."""
 
     def __init__(self, strength: float, seed: int) -> None:
         self.strength, self.seed = strength, seed
-        self.check(strength)
-
-    @classmethod
-    def check(cls, strength: float) -> None:
-        """Raise `ValueError` for a strength that has no meaning: here, unless it is a probability."""
-        if not 0 <= strength <= 1:
-            raise ValueError(f"{cls.name}: strength is a {cls.axis}, from 0 to 1; got {strength:g}")
 
     @classmethod
     def label(cls, strength: float) -> str:
@@ -75,7 +69,9 @@ class Disturbance(ABC):
 
 
 class _Drawn(Disturbance):
-    """A disturbance with fresh random numbers for each sensor and step."""
+    """A disturbance with fresh random numbers for each sensor and step, which `draw` draws for a number of steps."""
+
+    draw: draws.Draw
 
     def begin(self, episodes: Integers) -> draws.Drawn:
         """Random numbers for each episode."""
@@ -86,14 +82,17 @@ class _Drawn(Disturbance):
         numbers, state = draws.step(state, self.draw)
         return self.disturbed(readings, numbers), state
 
-    @staticmethod
-    @abstractmethod
-    def draw(generator: np.random.Generator, rows: int) -> Floats:
-        """Random numbers `[rows, n]`."""
-
     @abstractmethod
     def disturbed(self, readings: Floats, numbers: Floats) -> Floats:
         """Readings `[B, n]` disturbed by random numbers `[B, n]`."""
+
+
+def _uniform(generator: np.random.Generator, rows: int) -> Floats:
+    return generator.uniform(size=(rows, len(NAMES)))
+
+
+def _normal(generator: np.random.Generator, rows: int) -> Floats:
+    return generator.standard_normal((rows, len(NAMES)))
 
 
 class Missing(_Drawn):
@@ -102,11 +101,7 @@ class Missing(_Drawn):
     name = "missing"
     axis = "share of readings lost"
     gaps = True
-
-    @staticmethod
-    def draw(generator: np.random.Generator, rows: int) -> Floats:
-        """Uniform in [0, 1)."""
-        return generator.uniform(size=(rows, len(NAMES)))
+    draw = staticmethod(_uniform)
 
     def disturbed(self, readings: Floats, numbers: Floats) -> Floats:
         """NaN where lost."""
@@ -118,11 +113,7 @@ class Noisy(_Drawn):
 
     name = "noisy"
     axis = "noise, share of the sensor's range"
-
-    @staticmethod
-    def draw(generator: np.random.Generator, rows: int) -> Floats:
-        """Standard normal."""
-        return generator.standard_normal((rows, len(NAMES)))
+    draw = staticmethod(_normal)
 
     def disturbed(self, readings: Floats, numbers: Floats) -> Floats:
         """With noise added."""
@@ -154,25 +145,17 @@ class Stuck(Disturbance):
 
 
 class Delayed(Disturbance):
-    """Readings arrive some control steps late; until the first arrives, it stands for what came before."""
+    """Readings arrive some control steps late; until the first one arrives, it replaces those before it."""
 
     name = "delayed"
     axis = f"delay, control steps of {1000 // sim.CONTROL_HZ} ms"
 
-    @classmethod
-    def check(cls, strength: float) -> None:
-        """Raise `ValueError` unless the strength is a whole number of steps."""
-        if strength < 0 or strength != int(strength):
-            raise ValueError(f"{cls.name}: strength is a whole number of control steps; got {strength:g}")
-
-    def begin(self, episodes: Integers) -> tuple[NDArray[np.bool_], Floats]:
+    def begin(self, episodes: Integers) -> tuple[Flags, Floats]:
         """Whether the episode has only begun `[B]`, and the readings on their way `[B, strength, n]`, oldest first."""
         batch = len(episodes)
         return np.ones(batch, dtype=np.bool_), np.full((batch, int(self.strength), len(NAMES)), np.nan)
 
-    def disturb(
-        self, readings: Floats, state: tuple[NDArray[np.bool_], Floats]
-    ) -> tuple[Floats, tuple[NDArray[np.bool_], Floats]]:
+    def disturb(self, readings: Floats, state: tuple[Flags, Floats]) -> tuple[Floats, tuple[Flags, Floats]]:
         """The reading `strength` steps before."""
         new, waiting = state
         waiting = np.where(new[:, None, None], readings[:, None], waiting)
@@ -188,13 +171,6 @@ class Aliased(Disturbance):
     """The sensors that each strength 0, 1, ... takes away."""
 
     @classmethod
-    def check(cls, strength: float) -> None:
-        """Raise `ValueError` unless the strength is an index into `WITHOUT`."""
-        if strength not in range(len(cls.WITHOUT)):
-            choices = ", ".join(f"{i}: {cls.label(i)}" for i in range(len(cls.WITHOUT)))
-            raise ValueError(f"{cls.name}: strength is one of {choices}; got {strength:g}")
-
-    @classmethod
     def label(cls, strength: float) -> str:
         """The sensors that are gone."""
         return " and ".join(NAMES[i].replace("_", " ") for i in cls.WITHOUT[int(strength)]) or "none"
@@ -206,8 +182,11 @@ class Aliased(Disturbance):
         return readings, state
 
 
-class Disturbed:
-    """A controller that sees its sensors through a disturbance only; its state is the pair of both states."""
+DISTURBANCES: dict[str, type[Disturbance]] = {d.name: d for d in (Missing, Stuck, Delayed, Noisy, Aliased)}
+
+
+class DisturbedPolicy:
+    """A controller that gets disturbed readings; its state is the pair of the disturbance's and the controller's."""
 
     def __init__(self, disturbance: Disturbance, policy: sim.ControllerLike) -> None:
         self.disturbance, self.controller = disturbance, sim.as_controller(policy)
@@ -223,18 +202,15 @@ class Disturbed:
         return answer, (disturbance, controller)
 
 
-DISTURBANCES: dict[str, type[Disturbance]] = {d.name: d for d in (Missing, Stuck, Delayed, Noisy, Aliased)}
-
-
-def mixed(disturbances: Sequence[Disturbance], readings: Floats, episodes: Integers) -> Floats:
+def disturb_in_turns(disturbances: Sequence[Disturbance], readings: Floats, episodes: Integers) -> Floats:
     """Recorded readings `[N, n]` with the disturbances taking turns, one per episode: the first, the second, ...
 
     The rows of an episode are its steps from 0 on, in this order.
     """
-    _, turn = np.unique(episodes, return_inverse=True)
-    result = np.empty_like(readings)
-    for index, disturbance in enumerate(disturbances):
-        own = turn % len(disturbances) == index
-        if own.any():
-            result[own] = sim.replay(disturbance, readings[own], episodes[own])
-    return result
+    _, number = np.unique(episodes, return_inverse=True)
+    disturbed = np.empty_like(readings)
+    for turn, disturbance in enumerate(disturbances):
+        rows = number % len(disturbances) == turn
+        if rows.any():
+            disturbed[rows] = sim.replay(disturbance, readings[rows], episodes[rows])
+    return disturbed

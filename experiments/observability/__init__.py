@@ -1,0 +1,1 @@
+"""How robust is a learned behaviour to states that are observed in part, and does a memory help?"""

@@ -1,0 +1,1 @@
+"""What is left of a behaviour when a growing share of what it is made of is damaged?"""

@@ -1,0 +1,247 @@
+"""What is left of a behaviour when a growing share of what it is made of is damaged?
+
+Hypervectors are said to be robust to noise, and the paper claims that behaviours made of them are, too. Elements are
+drawn at random and have their sign flipped, are set to zero, or get Gaussian noise. What is damaged is the program,
+the codebooks, or the query; an MLP and a decision tree with the same share of their parameters damaged are compared
+with them. Nothing is trained on damaged parts.
+
+    torchvsa robustness
+    torchvsa robustness --multirun vsa.dim=500,1000,4000
+    torchvsa robustness learners=[default,mlp] damages=[flip] draws=2 drive_shares=[0]
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from rich.progress import Progress
+
+import sim
+import torchvsa
+from behaviours import Demonstrations, Space
+from experiments.kit import Cell, Part, Row, Study, grid, part, parts, setting, settings
+from experiments.models import hand_written
+from experiments.robustness import page
+from experiments.robustness.baselines import Network, Tree
+from experiments.robustness.damage import DAMAGES, PARAMETERS, PARTS, Damage, Damaged, Floats, Learner
+from experiments.robustness.programs import Program, refuse_undamageable
+from experiments.tasks import corral
+from experiments.tasks.agreement import share_right
+
+KEYS = ("learner", "part", "damage", "share")
+TEACHER = "teacher"
+
+
+@dataclass
+class Printed:
+    """The paper's codes, and its rule with a raw accumulator."""
+
+    encoder: Part = part("encoder", "lookup", "the code of one reading")
+    record: Part = part("record", "sum", "how the codes of all sensors become a condition")
+    protection: Part = part("protection", "self_shift", "what is done to a condition before it is bound")
+    rule: Part = part("rule", "one_shot", "how the program is learned")
+
+
+@dataclass
+class Robustness(corral.Learning):
+    """The settings of this study; those of `Learning` are the learner `default`."""
+
+    one_shot: Printed = settings(Printed, "the learner `one_shot`: the paper's codes, of the same architecture")
+    learners: list[str] = setting(
+        ["default", "one_shot", "hand_written", "mlp", "decision_tree"], "rows, in this order",
+        choices=lambda: LEARNERS, distinct=True,
+    )  # fmt: skip
+    parts: list[str] = setting(
+        list(PARTS), "what is damaged of learners with hypervectors; of others, it is their parameters",
+        choices=PARTS, distinct=True,
+    )  # fmt: skip
+    damages: list[str] = setting(list(DAMAGES), "what happens to an element", choices=DAMAGES, distinct=True)
+    shares: list[float] = setting(
+        [0.0, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5], "shares of the elements; they rise from 0", low=0, high=1
+    )
+    noise: float = setting(3.0, "standard deviation of noise, in root mean squares of the undamaged elements", low=0)
+    draws: int = setting(5, "draws of the damaged elements, for each share", low=1)
+    drive_shares: list[float] = setting([0.0, 0.1, 0.3], "those of the shares at which robots drive", empty=True)
+    starts: int = setting(100, "held-out starts, spread over the draws", low=1)
+    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    hidden: int = setting(64, "units of the MLP", low=1)
+    mlp_epochs: int = setting(60, "at most, over the demonstrations", low=1)
+    kept: float = setting(
+        0.95, "a share is survived if this much of the undamaged agreement or success is left", above=0, high=1
+    )
+
+
+def check(settings: Robustness) -> None:
+    """Raise for shares that make no sense, and for learners that cannot be built, trained or damaged."""
+    shares = settings.shares
+    if shares != sorted(set(shares)) or shares[0] != 0:
+        raise ValueError(f"shares begin with 0 and rise; got {shares}")
+    if unknown := [share for share in settings.drive_shares if share not in shares]:
+        raise ValueError(f"drive_shares are some of the shares {shares}; got {unknown}")
+    for name, options in (("default", settings), ("one_shot", settings.one_shot)):
+        if name in settings.learners:
+            space = space_of(settings, options)
+            refuse_undamageable(space)
+            parts.refuse_unsupported(parts.rule(options.rule), space)
+    if "hand_written" in settings.learners:
+        LEARNERS["hand_written"].learn(settings, None)
+
+
+def space_of(settings: Robustness, options: Robustness | Printed) -> Space:
+    """The codebooks of `default` or `one_shot`."""
+    vsa, protection = settings.vsa, options.protection
+    return parts.space(corral.schema(), vsa, options.encoder, options.record, protection, settings.seed)
+
+
+def _program(settings: Robustness, options: Robustness | Printed, train: Demonstrations) -> Learner:
+    return Program(parts.rule(options.rule).fit(space_of(settings, options), train))
+
+
+def _hand_written(settings: Robustness, train: Any) -> Learner:
+    return Program(hand_written.behaviour(torchvsa.architecture(**settings.vsa), settings.seed))
+
+
+@dataclass(frozen=True)
+class Maker:
+    """How a learner is made from demonstrations, and whether it is a hypervector."""
+
+    learn: Callable[[Robustness, Any], Learner]
+    hypervector: bool = True
+
+
+LEARNERS = {
+    "default": Maker(lambda settings, train: _program(settings, settings, train)),
+    "one_shot": Maker(lambda settings, train: _program(settings, settings.one_shot, train)),
+    "hand_written": Maker(_hand_written),
+    "mlp": Maker(lambda settings, train: Network(train, settings.seed, settings.hidden, settings.mlp_epochs), False),
+    "decision_tree": Maker(lambda settings, train: Tree(train, settings.seed), False),
+}
+
+
+class SharedStarts:
+    """Damaged copies of one learner that share the starts: copy e mod their number drives episode e."""
+
+    def __init__(self, copies: Sequence[Damaged]) -> None:
+        self.copies = copies
+
+    def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The state is the index of each robot's copy, `[B]`."""
+        return episodes % len(self.copies)
+
+    def step(self, readings: Floats, state: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+        """Commands `[B, 2]` for readings `[B, 3]`."""
+        commands = np.empty((len(readings), len(sim.ACTUATORS)))
+        for index in np.unique(state).tolist():
+            commands[state == index] = self.copies[index](readings[state == index])
+        return commands, state
+
+
+def cases(settings: Robustness) -> list[Cell]:
+    """The rows of the table, in its order."""
+    found: list[Cell] = []
+    for name in settings.learners:
+        damaged = settings.parts if LEARNERS[name].hypervector else [PARAMETERS]
+        found += grid(learner=[name], part=damaged, damage=settings.damages, share=settings.shares)
+    return found
+
+
+def cells(settings: Robustness) -> list[Cell]:
+    """A cell for each case; one for each undamaged learner, which is the same in all cases. Those that drive first."""
+    undamaged = grid(learner=[TEACHER, *settings.learners], share=[0.0])
+    found = [*undamaged, *(case for case in cases(settings) if case["share"])]
+    return sorted(found, key=lambda cell: (cell["share"] not in settings.drive_shares, cell.get("part") != "query"))
+
+
+@dataclass(frozen=True)
+class Material:
+    """What all cells share: the learners, and the teacher's held-out runs."""
+
+    settings: Robustness
+    learners: dict[str, Learner]
+    heldout: Demonstrations
+    teacher: Row
+
+
+def prepare(settings: Robustness, folder: Path, progress: Progress) -> Material:
+    """Let the teacher drive, and learn from it."""
+
+    def drive(what: str, episodes: range) -> sim.Rollout:
+        where = corral.arena(settings.arena)
+        return corral.drive_together(settings, what, sim.Teacher(), episodes, progress, where)
+
+    first = corral.FIRST_DEMONSTRATION
+    train, _ = corral.shown_in(drive("teacher demonstrates", range(first, first + settings.demonstrations)))
+    heldout = drive("teacher, held out", range(settings.starts))
+    names = progress.track(settings.learners, description="learn")
+    learners = {name: LEARNERS[name].learn(settings, train) for name in names}
+    return Material(settings, learners, corral.moving(heldout), corral.driven(heldout))
+
+
+def measure(material: Material, cell: Cell) -> list[Row]:
+    """A row for each draw of the damage: its agreement with the teacher, and how its robots drove."""
+    settings, share = material.settings, cell["share"]
+    if cell["learner"] == TEACHER:
+        return [material.teacher]
+    learner = material.learners[cell["learner"]]
+    # Nothing is drawn where nothing is damaged, so that any part and damage will do.
+    those = [cell] if share else [case for case in cases(settings) if cell.items() <= case.items()]
+    damages = [
+        Damage(those[0]["damage"], share, settings.noise, (settings.seed, draw))
+        for draw in range(settings.draws if share else 1)
+    ]
+    copies = [learner.damaged(those[0]["part"], damage) for damage in damages]
+    agreements = [share_right(copy, material.heldout) for copy in copies]
+    rollout = None
+    if share in settings.drive_shares:
+        arena = corral.arena(settings.arena)
+        rollout = corral.drive(settings, SharedStarts(copies), range(settings.starts), arena)
+    rows: list[Row] = []
+    for case in those:
+        size = learner.elements(case["part"])
+        for draw, (damage, agreement) in enumerate(zip(damages, agreements, strict=True)):
+            row = {**case, "draw": draw, "elements": size, "damaged": damage.count(size), "agreement": agreement}
+            turns = [] if rollout is None else rollout.success[rollout.episode % len(copies) == draw]
+            rows.append({**row, "episodes": len(turns), "successes": int(sum(turns))})
+    return rows
+
+
+def summarise(settings: Robustness, records: pd.DataFrame) -> list[Row]:
+    """One row for each case, the draws together; and one for the teacher."""
+    teacher = records[records.learner == TEACHER].iloc[0]
+    table: list[Row] = [{"learner": TEACHER, **corral.success(teacher.episodes, teacher.successes)}]
+    groups = dict(iter(records.groupby(list(KEYS))))
+    for case in cases(settings):
+        rows = groups[tuple(case.values())]
+        driven = corral.success(rows.episodes.sum(), rows.successes.sum())
+        agreement = {"agreement": rows.agreement.mean(), "agreement_min": rows.agreement.min()}
+        table.append({**case, **agreement, "agreement_max": rows.agreement.max(), **driven})
+    return table
+
+
+def metrics(settings: Robustness, records: pd.DataFrame, table: list[Row]) -> dict[str, float | None]:
+    """How many elements each part has."""
+    sizes = records.dropna(subset="part").drop_duplicates(["learner", "part"])
+    names = zip(sizes.learner, sizes.part, sizes.elements, strict=True)
+    return {f"{learner}.{part}.elements": float(size) for learner, part, size in names}
+
+
+study = Study(
+    name="robustness",
+    about="What is left of a behaviour when a growing share of what it is made of is damaged?",
+    settings=Robustness,
+    check=check,
+    cells=cells,
+    prepare=prepare,
+    measure=measure,
+    summarise=summarise,
+    keys=KEYS,
+    metrics=metrics,
+    tables=page.tables,
+    headline=page.headline,
+    page=page.fill,
+    presets={"quick": {"draws": 1, "starts": 20, "shares": [0.0, 0.2, 0.4], "drive_shares": [0.0]}},
+)
