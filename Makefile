@@ -8,7 +8,7 @@ INSTALLED := $(VENV)/.installed
 .PHONY: run test lint bench fuzz
 
 run: $(INSTALLED)
-	$(BIN)/python -m experiments.corral
+	$(BIN)/python -m experiments corral
 
 test: $(INSTALLED) lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal

@@ -7,7 +7,7 @@ from torch import Tensor
 
 import sim
 from behaviours import Demonstrations, Space
-from experiments import presets
+from experiments.tasks.corral import schema
 from torchvsa import MAP, SelfShift
 from torchvsa.encoders import Lookup, Sum
 
@@ -25,8 +25,8 @@ def samples(count: int) -> Demonstrations:
 def space(dim: int, device: str) -> Space:
     """The paper's: 32 lookup codes, bundled, behind the self-derived shift with the mean width."""
     vsa = MAP(dim, dtype=torch.int8)
-    schema = presets.schema()
-    return Space(schema, Sum(Lookup(vsa, 32), len(schema.sensors)), protection=SelfShift(vsa)).to(device)
+    robot = schema()
+    return Space(robot, Sum(Lookup(vsa, 32), len(robot.sensors)), protection=SelfShift(vsa)).to(device)
 
 
 def different(space: Space, rows: int, generator: torch.Generator) -> Tensor:

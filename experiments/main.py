@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-import experiments.studies  # noqa: F401  (registers them)
+import experiments.studies
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.run import draw, load
@@ -22,6 +22,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name, rest = given[0], given[1:]
     if name == "draw":
         draw_again(rest)
+        return
+    if name == "settings":
+        print(experiments.studies.settings_page(), end="")
         return
     with errors_in_one_line("torchvsa"):
         study = STUDIES.find(name)
@@ -52,4 +55,5 @@ def print_commands(console: Console) -> None:
     for name, study in STUDIES.items():
         table.add_row(name, study.about)
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
+    table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)

@@ -1,5 +1,29 @@
-"""All studies: importing this module registers them."""
+"""All studies: importing this module imports every module and package of studies, which register what they define."""
 
-from experiments import capacity, corral, generalisation, robustness
+import pkgutil
+from importlib import import_module
 
-__all__ = ["capacity", "corral", "generalisation", "robustness"]
+import experiments
+from experiments.kit import STUDIES
+from experiments.kit.help import groups, markdown, markdown_of_group
+
+_TITLE = """<!-- Written by `torchvsa settings`; a test compares the two. -->
+# Settings
+
+What every study can be told: `torchvsa STUDY setting=value`. `torchvsa STUDY --help` prints the same. A group holds one
+of several options: `group=option` chooses one, `group.setting=value` changes it.
+"""
+
+_SHARED = ("__main__", "main", "studies", "kit", "models", "tasks")
+
+for _module in pkgutil.iter_modules(experiments.__path__):
+    if _module.name not in _SHARED:
+        import_module(f"experiments.{_module.name}")
+
+
+def settings_page() -> str:
+    """All settings of all studies, and the options of all groups, as a page of the docs."""
+    studies = "\n\n".join(markdown(study) for _, study in sorted(STUDIES.items()))
+    used = dict.fromkeys(group for _, study in sorted(STUDIES.items()) for group in groups(study.settings))
+    options = "\n\n".join(markdown_of_group(group) for group in used)
+    return f"{_TITLE}\n{studies}\n\n{options}\n"

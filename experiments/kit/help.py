@@ -67,7 +67,7 @@ def markdown_of_group(group: str) -> str:
             (f"`{group}.{name}`", f"`{default}`", about) for name, default, about in described_option(group, option)
         ]
         rows += [(f"`{group}={option}`" * (place == 0), *row) for place, row in enumerate(found or [("", "", "")])]
-    return f"## {group}\n\n{_markdown(('option', 'setting', 'default', 'meaning'), rows)}"
+    return f"## Options of {group}\n\n{_markdown(('option', 'setting', 'default', 'meaning'), rows)}"
 
 
 def _markdown(titles: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

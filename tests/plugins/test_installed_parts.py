@@ -59,8 +59,8 @@ for readings in walk:
 print(json.dumps(answers))
 """
 SETTINGS = """
-from experiments import presets
-assert type(presets.rule({"name": "average"})).__module__ == "robot_parts"
+from experiments.kit import parts
+assert type(parts.rule({"name": "average"})).__module__ == "robot_parts"
 """
 WITHOUT = """
 from behaviours import BehaviourBank
@@ -98,6 +98,20 @@ def test_an_installed_package_of_parts_works_like_the_librarys_own(site: Path, t
     bank, waves = without.stdout.splitlines()
     assert re.match(r"bank\.safetensors .*there is no architecture 'Signed'; choose one of MAP-C, .*", bank)
     assert re.match(r"waves\.safetensors .*there is no value encoder 'waves'; choose one of lookup, .*", waves)
+
+
+@pytest.mark.slow
+def test_its_study_and_arena_are_commands_and_options_like_the_others(site: Path, tmp_path: Path) -> None:
+    torchvsa = "from experiments.main import main; main({!r})"
+    help_ = python(site, torchvsa.format([]), cwd=tmp_path)
+    assert re.search(r"gaps +How wide must the gap be\?", help_.stdout), help_.stderr
+    run = python(site, torchvsa.format(["gaps", "starts=3", "seconds=20", "workers=2"]), cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    (results,) = tmp_path.rglob("results.json")
+    assert [row["gap"] for row in json.loads(results.read_text())["table"]] == [0.8, 1.4]
+    options = python(site, torchvsa.format(["corral", "--help"]), cwd=tmp_path).stdout
+    for part in ("signed", "average", "hysteresis", "hall"):
+        assert part in options
 
 
 @pytest.mark.slow

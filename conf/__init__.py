@@ -1,1 +1,0 @@
-"""What Hydra reads; a package, so that an installed wheel carries it."""

@@ -1,0 +1,43 @@
+"""All studies: each appears by itself, composes, and states what it can be told."""
+
+import dataclasses
+from pathlib import Path
+
+import pytest
+from kits import composed
+
+import experiments.studies
+from experiments.kit import STUDIES
+from experiments.kit.help import groups, markdown, markdown_of_group
+from experiments.kit.options import options
+from experiments.kit.run import check_all
+
+ROOT = Path(__file__).parents[2]
+NAMES = ("capacity", "corral", "generalisation", "observability", "robustness", "smooth", "wall_following")
+
+
+def test_the_studies_are_all_there() -> None:
+    assert experiments.studies
+    assert [name for name in STUDIES if name in NAMES] == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_preset_composes_and_is_allowed(name: str) -> None:
+    study = STUDIES[name]
+    assert dataclasses.is_dataclass(study.settings)
+    for preset in (None, *study.presets):
+        check_all(study, composed(study, *([] if preset is None else [f"experiment={preset}"])))
+
+
+def test_the_page_of_all_settings_is_up_to_date() -> None:
+    assert (ROOT / "docs" / "settings.md").read_text() == experiments.studies.settings_page()
+
+
+def test_readme_and_docs_name_every_study() -> None:
+    readme = (ROOT / "README.md").read_text()
+    for name in NAMES:
+        assert f"torchvsa {name}" in readme
+        assert groups(STUDIES[name].settings) is not None
+        assert markdown(STUDIES[name]).startswith(f"## {name}\n")
+    assert "`rule=error_driven`" in markdown_of_group("rule")
+    assert "literal" in options("rule")
