@@ -36,7 +36,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
             clean = CleanUp(items.to(device, dtype))
             queries = [query.to(device, dtype) for query in asked]
 
-            for suffix, call in variants(clean, compiled=device != "cpu").items():
+            for suffix, call in variants(clean, small, compiles=device != "cpu").items():
 
                 def check(call=call, queries=queries, peers=peers) -> None:
                     for peer in peers.values():

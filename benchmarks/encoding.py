@@ -26,7 +26,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
         # 3 sensors are bound by writing the result, 24 by reading the entries of the table.
         result = record.encode(rows[0])
         floor = floors.fill(result) if sensors == 3 else floors.read(sensors * result.numel(), device)
-        for suffix, call in variants(record.encode, compiled=True).items():
+        for suffix, call in variants(record.encode, small).items():
 
             def check(call=call, rows=rows, peer=peer) -> None:
                 for theirs in (peer.default, peer.tuned):

@@ -43,9 +43,18 @@ class Case:
     """Further columns of the row."""
 
 
-def variants(call: Callable[..., Any], compiled: bool) -> dict[str, Callable[..., Any]]:
+def compiled(call: Callable[..., Any], small: bool, **options: Any) -> Callable[..., Any]:
+    """The call in one graph. A small run only traces it, since a compiler takes seconds for each."""
+    backend = "aot_eager" if small else "inductor"
+    return cast(
+        Callable[..., Any],
+        torch.compile(call, fullgraph=True, dynamic=False, backend=backend, options=None if small else options),
+    )
+
+
+def variants(call: Callable[..., Any], small: bool, compiles: bool = True) -> dict[str, Callable[..., Any]]:
     """The call by what is added to its name, and, if it pays, as PyTorch compiles it."""
-    return {"": call} | ({", compiled": torch.compile(call, fullgraph=True, dynamic=False)} if compiled else {})
+    return {"": call} | ({", compiled": compiled(call, small)} if compiles else {})
 
 
 def time_case(case: Case, threads: int, repeats: int, device: str) -> list[dict[str, Any]]:

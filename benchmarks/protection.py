@@ -24,7 +24,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
         protect = SelfShift(vsa, width, seed=1).to(device)
         peer = Peer(protect.h, width)
 
-        for suffix, call in variants(protect, compiled=device != "cpu").items():
+        for suffix, call in variants(protect, small, compiles=device != "cpu").items():
 
             def check(call=call, peer=peer) -> None:
                 assert torch.equal(call(inputs[0]).float(), plain(peer(floats[0])))

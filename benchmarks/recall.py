@@ -1,14 +1,13 @@
 """Algorithm 2: many queries at once, and one control tick."""
 
 from collections.abc import Iterator
-from typing import Any
 
 import torch
 from torch.testing import assert_close
 
 from behaviours import Actuator, Demonstrations, OneShot, Schema, Sensor, Space
 from benchmarks import corral
-from benchmarks.harness import INPUTS, Case
+from benchmarks.harness import INPUTS, Case, compiled
 from benchmarks.literal import Literal
 from torchvsa import MAP
 from torchvsa.encoders import ThresholdFeatures
@@ -26,15 +25,14 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
     behaviour = rule.fit(space, shown)
     literal.learn(space.cells(shown.sensors), space.schema.command_levels(shown.commands), rule.sigmas / dim**0.5)
     generator = torch.Generator().manual_seed(0)
-    options: Any = {"guard_filter_fn": torch.compiler.skip_guard_on_all_nn_modules_unsafe}
     frozen = behaviour.freeze()
-    compiled: Any = torch.compile(frozen, fullgraph=True, dynamic=False, options=options)
+    graph = compiled(frozen, small, guard_filter_fn=torch.compiler.skip_guard_on_all_nn_modules_unsafe)
     for name, ask, rows, differ in (
         ("Algorithm 2", behaviour, batch, False),
         ("Algorithm 2, all different", behaviour, batch, True),
         ("Algorithm 2, one control tick", behaviour, 1, False),
         ("Algorithm 2, one control tick, frozen", frozen, 1, False),
-        ("Algorithm 2, one control tick, compiled", compiled, 1, False),
+        ("Algorithm 2, one control tick, compiled", graph, 1, False),
     ):
         readings = [
             corral.different(space, rows, generator)

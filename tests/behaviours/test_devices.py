@@ -32,7 +32,7 @@ from torchvsa import ARCHITECTURES
 from torchvsa.encoders import History
 from torchvsa.encoders.history import windows
 
-SHOWN = random_pairs(40)
+SHOWN = random_pairs(20)
 
 
 TWICE = Demonstrations(SHOWN.sensors.repeat(2, 1), torch.cat([SHOWN.commands, SHOWN.commands.flip(0)]))
@@ -126,11 +126,11 @@ def check_demonstrations() -> None:
     alike(learned, OneShot().fit(away, shown), exact=True)
     same(lambda behaviour, readings: behaviour(readings), learned, SHOWN.sensors, exact=False, waits=True)
     lost = torch.where(torch.rand(SHOWN.sensors.shape, generator=seeded(0)) < 0.3, torch.nan, SHOWN.sensors)
-    episodes = torch.arange(40) // 13
+    episodes = torch.arange(20) // 7
     for hold in (False, True):
         same(lambda r, e, hold=hold: windows(r, e, [1, 3], hold), lost, episodes, waits=True)
     same(lambda readings: quantile_edges(readings, 5), SHOWN.sensors[:, 0], waits=True)
-    assert len(shown.where([row < 5 for row in range(80)])) == 5
+    assert len(shown.where([row < 5 for row in range(len(shown))])) == 5
     history = History(here.encoder, [1])
     same(lambda encode, rows: encode(rows), history, history.windows(here.schema.normalise(SHOWN.sensors), episodes))
 
@@ -145,8 +145,8 @@ def test_policies_and_banks(
 def check_policies(policy: Callable[[BehaviourBank], Policy], path: Path) -> None:
     banks = [BehaviourBank(s) for s in spaces("MAP-C")]
     for bank in banks:
-        bank.learn("low", SHOWN.where([row < 20 for row in range(40)]), OneShot())
-        bank.learn("high", SHOWN.where([row >= 20 for row in range(40)]), OneShot())
+        bank.learn("low", SHOWN.where([row < 10 for row in range(20)]), OneShot())
+        bank.learn("high", SHOWN.where([row >= 10 for row in range(20)]), OneShot())
     here, away = (policy(bank) for bank in banks)
     answers_alike(here, away)
     answers_alike(here, other().moved(here))
