@@ -1,5 +1,6 @@
 """`python -m experiments.corral` is `torchvsa corral`."""
 
-from experiments.main import corral
+from experiments.corral.study import study
+from experiments.kit.command import run_study
 
-corral()
+run_study(study)

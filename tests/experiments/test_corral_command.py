@@ -104,8 +104,9 @@ def test_what_was_learned_is_kept_and_can_be_learned_again(finished: tuple[Path,
 def without_timings(outcome: Outcome, *controllers: str) -> list[Row]:
     """The records of some controllers, without what may differ from run to run, as text (NaN equals itself)."""
     records = outcome.records.drop(columns="query_us")
-    rows = records[records.controller.isin(controllers)].sort_values(by="controller", kind="stable")
-    return [{key: repr(value) for key, value in row.items()} for row in rows.to_dict("records")]
+    rows = records.loc[records.controller.isin(controllers)]
+    found = [{key: repr(value) for key, value in row.items()} for row in rows.to_dict(orient="records")]
+    return sorted(found, key=lambda row: row["controller"])
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def test_a_map_is_the_recall_cell_by_cell(who: str, plane: Slice) -> None:
     bins, teacher = bins_of(who), sim.Teacher()
     shown = command_map(program(who), bins, plane, held_out())
     assert len(shown) == bins**2
-    for _, cell in shown.iterrows():
+    for cell in shown.to_dict(orient="records"):
         reading = np.empty(3)
         for sensor, place in ((plane.x, cell["column"]), (plane.y, cell["row"])):
             high = sim.SENSORS[sensor].high
@@ -158,11 +158,11 @@ def test_a_timeline_is_the_recall_moment_by_moment(who: str) -> None:
     for at in range(0, len(path), 25):
         recall = program(who)(path.sensors[at][None])
         for column in ("similarity", "familiarity", "margin"):
-            assert line[column][at] == pytest.approx(float(getattr(recall, column)[0]), abs=1e-6)
+            assert line[column].tolist()[at] == pytest.approx(float(getattr(recall, column)[0]), abs=1e-6)
         teacher = sim.Teacher()(path.sensors[at][None])[0]
-        assert line.differs[at] == (name_of(recall.commands[0].numpy()) != name_of(teacher))
+        assert line.differs.tolist()[at] == (name_of(recall.commands[0].numpy()) != name_of(teacher))
         if recall.speaker is not None:
-            assert line.speaker[at] == list(sim.BEHAVIOURS)[int(recall.speaker[0])]
+            assert line.speaker.tolist()[at] == list(sim.BEHAVIOURS)[int(recall.speaker[0])]
     assert ("speaker" in line) == (who == "bundled")
 
 
@@ -223,7 +223,7 @@ def test_a_controller_that_never_fails_has_no_mistakes() -> None:
     assert solved.any()
     assert [end is None for end in ends(one)] == solved.tolist()
     assert not unlike_teacher(one).any()
-    (row,) = failing(episodes("teacher")[lambda frame: frame.success], ["teacher"])
+    (row,) = failing(episodes("teacher").loc[lambda frame: frame.success], ["teacher"])
     assert (row["failed"], row["unlike_teacher"]) == (0, None)
 
 
