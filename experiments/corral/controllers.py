@@ -129,8 +129,8 @@ def printed_space(settings: Corral, bins: int | None = None, protection: parts.O
     encoder = {**printed.encoder}
     if "bins" in encoder:
         encoder["bins"] = settings.encoder.get("bins", encoder["bins"]) if bins is None else bins
-    protection = protection or printed.protection
-    return parts.space(corral.schema(), settings.vsa, encoder, printed.record, protection, settings.seed)
+    chosen = printed.protection if protection is None else protection
+    return parts.space(corral.schema(), settings.vsa, encoder, printed.record, chosen, settings.seed)
 
 
 def paper(task: Task, bins: int | None = None, name: str = "paper") -> Controller:

@@ -33,7 +33,7 @@ def command_maps(maps: Mapping[str, pd.DataFrame]) -> Figure:
     rows = [("teacher", first.assign(learned=first.teacher)), *maps.items()]
     for axes_row, (name, frame) in zip(grid, rows, strict=True):
         for axes, plane in zip(axes_row, SLICES, strict=True):
-            cells = frame[frame.slice == plane.title]
+            cells = frame.loc[frame.slice == plane.title]
             draw_slice(axes, plane, cells)
             differs, met = cells.learned != cells.teacher, cells.samples > 0
             axes.set_title(
@@ -81,7 +81,7 @@ def draw_slice(axes: Axes, plane: Slice, cells: pd.DataFrame) -> None:
         ]
         outline = Path.make_compound_path(*squares)
         axes.add_patch(PathPatch(outline, facecolor="none", edgecolor=HATCH, hatch="/////", linewidth=0))
-    met = cells[cells.samples > 0]
+    met = cells.loc[cells.samples > 0]
     if len(met):
         # The area grows with the logarithm, or the few cells of the straight runs would hide all others.
         area = 1.5 + 14 * np.log1p(met.samples) / np.log1p(met.samples.max())

@@ -52,9 +52,9 @@ def prepare(settings: Corral, folder: Path, progress: Progress) -> Material:
         train, moving = corral.shown_in(shown)[0], corral.moving(shown)
     else:
         train = moving = corral.from_file(settings.demonstrations_file)
-    train.save(folder / "demonstrations.safetensors")
     bar = progress.add_task("learn", total=None)
     bank = learn(settings, train, lambda name: progress.update(bar, description=f"learned {name}"))
+    train.save(folder / "demonstrations.safetensors")
     bank.save(folder / "behaviours.safetensors")
     progress.remove_task(bar)
     held_out = range(settings.starts)

@@ -68,7 +68,7 @@ class Run:
         steps, settings = self.kept("trajectories", name), self.outcome.settings
         if steps is None:
             return None
-        episodes = self.episodes[self.episodes.controller == name]
+        episodes = self.episodes.loc[self.episodes.controller == name]
         return as_rollout(steps, episodes, corral.arena(settings.arena), settings.seed, settings.seconds)
 
 
@@ -172,7 +172,7 @@ def _printed(run: Run, page: Page) -> None:
     section.table(tables.COUNTS.show(counts))
     section.text(*(text.counts_summary(row) for row in counts))
     records = run.outcome.records
-    candidates = records[records.kind == "candidate"].to_dict("records")
+    candidates = records.loc[records.kind == "candidate"].to_dict(orient="records")
     if candidates:
         section.table(tables.CANDIDATES.show(candidates))
     found = [run.kept("recall", name) for name in names]

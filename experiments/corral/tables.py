@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -15,7 +16,7 @@ WHOLE = ("episodes", "common_episodes", "pairs_stored", "bins")
 """Numbers that are whole."""
 
 
-def is_learner(row: Row) -> bool:
+def is_learner(row: Mapping[str, Any]) -> bool:
     """Whether a row competes; the teachers are what it is measured against."""
     return not row["controller"].startswith("teacher")
 
@@ -187,7 +188,7 @@ SETTINGS = Table("What was run", [Column("setting"), Column("value")], words=Tru
 def by_controller(records: pd.DataFrame) -> dict[str, Row]:
     """The numbers that were measured of each controller, without those that do not apply to it."""
     found = {}
-    for row in records[records.kind == "controller"].to_dict("records"):
+    for row in records.loc[records.kind == "controller"].to_dict(orient="records"):
         known = {
             str(key): value for key, value in row.items() if not pd.isna(value) and key not in ("kind", "controller")
         }
@@ -198,7 +199,7 @@ def by_controller(records: pd.DataFrame) -> dict[str, Row]:
 def learning(records: pd.DataFrame) -> list[Row]:
     """What a learning rule did, for each behaviour of each controller."""
     rows = records.loc[records.kind == "learning"].reindex(columns=["controller", "behaviour", *COUNTS_OF_LEARNING])
-    return rows.astype(dict.fromkeys(COUNTS_OF_LEARNING, int)).to_dict("records")
+    return rows.astype(dict.fromkeys(COUNTS_OF_LEARNING, int)).to_dict(orient="records")
 
 
 def episodes_of(records: pd.DataFrame) -> pd.DataFrame:
@@ -208,7 +209,7 @@ def episodes_of(records: pd.DataFrame) -> pd.DataFrame:
 
 def shared_success(episodes: pd.DataFrame, names: Sequence[str]) -> dict[str, pd.Series]:
     """The success of each of these controllers on the starts that all of them drove."""
-    chosen = {name: episodes[episodes.controller == name].set_index("episode").success for name in names}
+    chosen = {name: episodes.loc[episodes.controller == name].set_index("episode").success for name in names}
     shared = set.intersection(*(set(success.index) for success in chosen.values()))
     return {name: success[success.index.isin(shared)] for name, success in chosen.items()}
 
@@ -217,8 +218,8 @@ def failing(episodes: pd.DataFrame, names: Sequence[str]) -> list[Row]:
     """For each controller, how many episodes failed, where their robots ended, and the steps unlike the teacher's."""
     rows = []
     for name in names:
-        driven = episodes[episodes.controller == name]
-        failed = driven[~driven.success]
+        driven = episodes.loc[episodes.controller == name]
+        failed = driven.loc[~driven.success]
         wrong = failed.steps_unlike_teacher.sum() / failed.steps.sum() if len(failed) else None
         ends = {place: int((failed.end == place).sum()) for place in PLACES}
         rows.append({"controller": name, "failed": len(failed), "of": len(driven), **ends, "unlike_teacher": wrong})
@@ -227,11 +228,11 @@ def failing(episodes: pd.DataFrame, names: Sequence[str]) -> list[Row]:
 
 def most_frequent_mistakes(records: pd.DataFrame, names: Sequence[str], most: int = 3) -> list[Row]:
     """The most frequent differences of each controller that fails."""
-    rows = records[(records.kind == "mistake") & records.controller.isin(names)].groupby("controller").head(most)
+    rows = records.loc[(records.kind == "mistake") & records.controller.isin(names)].groupby("controller").head(most)
     return [
         {**row, "readings": ", ".join(f"{row[sensor.name]:.2f}" for sensor in sim.SENSORS)}
         for name in names
-        for row in rows[rows.controller == name].to_dict("records")
+        for row in rows.loc[rows.controller == name].to_dict(orient="records")
     ]
 
 

@@ -133,7 +133,7 @@ def counts_summary(row: Row) -> str:
 
 def recall_summary(recall: pd.DataFrame, printed: Mapping[str, object]) -> list[str]:
     """What the steps between the printed algorithm and the default change, from the measured recall."""
-    shares = {name: float(recall[name].mean()) for name in (PRINTED, CLIPPED, MEAN, SUM, DEFAULT)}
+    shares = {name: float(recall[name].to_numpy().mean()) for name in (PRINTED, CLIPPED, MEAN, SUM, DEFAULT)}
     ages = by_age(recall, CLIPPED, 5).recall.tolist()
     group = len(recall) // len(ages)
     text = (

@@ -33,7 +33,7 @@ def control_steps(
     """
     path = rollout.trajectory.rows(np.isin(rollout.step_episode, episodes))
     frame = pd.DataFrame({"episode": np.repeat(rollout.episode, np.diff(rollout.offsets))})
-    frame = frame[np.isin(rollout.step_episode, episodes)].reset_index(drop=True)
+    frame = frame.loc[np.isin(rollout.step_episode, episodes)].reset_index(drop=True)
     for name in ("step", "x", "y", "heading", "contact", "at_lamp", "reached"):
         frame[name] = getattr(path, name)
     frame[SENSORS], frame[MOTORS] = path.sensors, path.commands
@@ -51,7 +51,7 @@ def control_steps(
 def timeline(steps: pd.DataFrame, episode: int) -> pd.DataFrame:
     """One episode: its control steps, `seconds` since the start, the teacher's `rule`, and whether the command
     `differs` from the teacher's."""
-    frame = steps[steps.episode == episode].reset_index(drop=True)
+    frame = steps.loc[steps.episode == episode].reset_index(drop=True)
     rule = sim.Teacher().rule(frame[SENSORS].to_numpy())
     given = kinds(np.clip(frame[MOTORS].to_numpy(), -1, 1))
     return frame.assign(seconds=frame.step / sim.CONTROL_HZ, rule=rule, differs=given != kinds(TEACHER_COMMANDS)[rule])
@@ -59,9 +59,11 @@ def timeline(steps: pd.DataFrame, episode: int) -> pd.DataFrame:
 
 def as_rollout(steps: pd.DataFrame, episodes: pd.DataFrame, arena: sim.Arena, seed: int, seconds: float) -> sim.Rollout:
     """Control steps and the records of their episodes as a rollout again, to be drawn."""
-    episodes = episodes[episodes.episode.isin(steps.episode)]
+    episodes = episodes.loc[episodes.episode.isin(steps.episode)]
     columns = {name: steps[name].to_numpy() for name in ("step", "x", "y", "heading", "contact", "at_lamp", "reached")}
-    trajectory = sim.Steps(sensors=steps[SENSORS].to_numpy(), commands=steps[MOTORS].to_numpy(), **columns)
+    trajectory = sim.Steps(
+        sensors=steps[SENSORS].to_numpy(np.float64), commands=steps[MOTORS].to_numpy(np.float64), **columns
+    )
     count = episodes.steps.to_numpy(np.int64)
     return sim.Rollout(
         arena=arena,

@@ -108,6 +108,8 @@ def check(given: object, prefix: str = "") -> None:
         name, value, metadata = prefix + field.name, getattr(given, field.name), field.metadata
         if "settings" in metadata:
             check(value, f"{name}.")
+        elif "group" in metadata and isinstance(value, str):
+            raise ValueError(f"{name}={value}: to choose an option, write {metadata['group']}@{name}={value}")
         elif "allowed" in metadata:
             _check(name, value, metadata)
 

@@ -1,36 +1,43 @@
-"""A tiny run of the main job, made in this process: everything that its report is written from."""
+"""A tiny run of the main job, made in this process: everything that its page is drawn from."""
 
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import cast
 
-import numpy as np
 import torch
-from hydra import compose, initialize_config_module
-from omegaconf import OmegaConf
+from kits import composed
+from rich.console import Console
 from rich.progress import Progress
 
 import sim
-from behaviours import Demonstrations
-from experiments import presets
-from experiments.agreement import measure
-from experiments.controllers import CONTROLLERS, Study
-from experiments.corral import COLUMNS
-from experiments.corral_report import CorralRun, write_report
-from experiments.results import Results
+from behaviours import Behaviour, Demonstrations, Policy
+from experiments.corral import study
+from experiments.corral.controllers import CONTROLLERS, Controller
+from experiments.corral.measure import Material, prepare
+from experiments.corral.settings import Corral
+from experiments.kit import Outcome
+from experiments.kit.run import run
+from experiments.tasks import corral
 
+STARTS = range(8)
 SETTINGS = (
     "vsa.dim=600",
     "encoder.bins=8",
     "encoder.span=2",
-    "seconds=10",
-    "paper_bins=[2]",
-    "starts=8",
     "rule.epochs=20",
+    "seconds=10",
+    "demonstrations=6",
+    "paper_bins=[2]",
+    "validation_starts=2",
+    f"starts={len(STARTS)}",
+    f"wheeled_starts={len(STARTS)}",
+    f"other_starts={len(STARTS)}",
+    "robots=8",
+    "workers=1",
 )
-STARTS = range(8)
 
 
 @contextmanager
@@ -42,64 +49,47 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
+def settings(*overrides: str) -> Corral:
+    return cast(Corral, composed(study, *SETTINGS, *overrides))
+
+
+@one_thread()
+def small_run(folder: Path, *overrides: str) -> Outcome:
+    """Run the job with these settings, and draw its page."""
+    return run(study, settings(*overrides), folder, Console(quiet=True))
+
+
+@cache
+def full_run() -> Outcome:
+    """All controllers."""
+    return small_run(Path(tempfile.mkdtemp()))
+
+
 @cache
 @one_thread()
-def small_run() -> CorralRun:
-    """All controllers, 8 starts each."""
-    with initialize_config_module("experiments.conf", version_base="1.3"):
-        config: Any = OmegaConf.to_container(
-            compose("corral", overrides=[*SETTINGS, f"starts={len(STARTS)}"]), resolve=True
-        )
-    reference = presets.space(config["vsa"], config, config["seed"])
-    shown, shown_moving = _demonstrations(range(1000, 1006))
-    heldout, moving = _demonstrations(STARTS)
-    train = Demonstrations(shown.trajectory.sensors, shown.trajectory.commands, shown.step_episode)
-    # Choosing the bins of `paper_best_bins` is not what is tested, so no candidate is driven.
-    study = Study(config, reference, train, sim.Teacher().rule(train.sensors.numpy()), validate=lambda policy: heldout)
-    controllers = {name: make(study) for name, make in CONTROLLERS.items()}
-    rollouts = {name: _drive(one.policy, STARTS, one.body or "planar") for name, one in controllers.items()}
-    agreements = {
-        name: measure(one, shown_moving, moving, reference) for name, one in controllers.items()
-    }  # fmt: skip
-    table = []
-    for name, one in controllers.items():
-        summary = vars(rollouts[name].summary())
-        agreement = agreements[name]
-        row = summary | {
-            "controller": name,
-            "train_agreement": agreement.train,
-            "heldout_agreement": agreement.heldout,
-            "unseen_agreement": agreement.unseen,
-            "pairs_stored": one.pairs,
-            "bins": one.bins,
-            "query_us": 100.0,
-        }
-        table.append({column: row[column] for column in COLUMNS})
-    results = Results("corral", config, config["seed"], table)
-    return CorralRun(Path(), results, controllers, rollouts, agreements, shown_moving, moving)
+def material() -> Material:
+    """What the cells of this run share."""
+    with Progress(disable=True) as progress:
+        return prepare(settings(), Path(tempfile.mkdtemp()), progress)
 
 
-def report(folder: Path, *names: str, **config: object) -> str:
-    """The page of the small run with only these controllers (all, if none is named) and some settings changed."""
-    run = small_run()
-    names = names or tuple(run.controllers)
-    table = [row for row in run.results.table if row["controller"] in names]
-    results = Results("corral", {**run.results.config, **config}, run.results.seed, table)
-    controllers = {name: run.controllers[name] for name in names}
-    rollouts = {name: run.rollouts[name] for name in names}
-    agreements = {name: run.agreements[name] for name in names}
-    with one_thread(), Progress(disable=True) as progress:
-        return write_report(
-            folder, results, controllers, rollouts, agreements, run.train, run.heldout, progress
-        ).read_text()
+@cache
+@one_thread()
+def controller(name: str) -> Controller:
+    return CONTROLLERS[name](material().task)
 
 
-def _drive(policy: sim.ControllerLike, episodes: range, body: str = "planar") -> sim.Rollout:
-    return sim.rollout(policy, body=body, episodes=episodes, seconds=10, robots=8)
+def program(name: str) -> Behaviour | Policy:
+    found = controller(name).program
+    assert found is not None
+    return found
 
 
-def _demonstrations(episodes: range) -> tuple[sim.Rollout, Demonstrations]:
-    rollout = _drive(sim.Teacher(), episodes)
-    path = rollout.trajectory
-    moving = np.flatnonzero(~path.reached)
-    return rollout, Demonstrations(path.sensors[moving], path.commands[moving], rollout.step_episode[moving])
+@cache
+@one_thread()
+def rollout(name: str) -> sim.Rollout:
+    return corral.drive(settings(), controller(name).policy, STARTS, record=True)
+
+
+def held_out() -> Demonstrations:
+    return corral.moving(material().examined)

@@ -1,55 +1,70 @@
 """Bad input gets one clear line that names what is wrong, a non-zero exit, and no half-written result."""
 
+from collections.abc import Callable
 from pathlib import Path
-from subprocess import CompletedProcess
 
 import pytest
 import torch
-from commands import SMALL, corral
 
 from behaviours.storage import save_tensors
+from experiments.main import main
+
+Refused = Callable[..., str]
 
 
-def assert_refused(run: CompletedProcess[str], words: str, folder: Path) -> None:
-    assert run.returncode == 1
-    (line,) = run.stderr.splitlines()
-    assert words in line
-    assert "Traceback" not in run.stdout
-    for unfinished in ("results.json", "report.html", "records.parquet", "behaviours.safetensors"):
-        assert not list(folder.rglob(unfinished))
+@pytest.fixture
+def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Refused:
+    """What the command says to overrides that it refuses: one line, and nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")  # which the command changes
+    monkeypatch.setattr("sys.argv", ["torchvsa"])
+
+    def call(*overrides: str) -> str:
+        with pytest.raises(SystemExit) as exit_:
+            main(["corral", *overrides])
+        assert exit_.value.code == 1
+        printed = capsys.readouterr()
+        (line,) = printed.err.splitlines()
+        assert "Traceback" not in printed.out
+        for unfinished in ("results.json", "report.html", "cells.jsonl", "*.parquet", "behaviours.safetensors"):
+            assert not list(tmp_path.rglob(unfinished))
+        return line
+
+    return call
 
 
 @pytest.mark.parametrize(
-    ("override", "words"),
+    ("overrides", "words"),
     [
         ("experiment=nonsense", "nonsense"),
         ("rule=nonsense", "nonsense"),
-        ("controllers=[teacher,nobody]", "'nobody'"),
+        ("arena=nowhere", "nowhere"),
+        ("controllers=[teacher,nobody]", "controllers: there is no 'nobody'; choose from teacher, default"),
+        ("controllers=[random,random]", "controllers names 'random' 2 times"),
+        ("controllers=[]", "controllers is empty; choose from teacher, default"),
         ("vsa.name=MAP-X", "'MAP-X'"),
         ("vsa.dim=0", "dim"),
         ("vsa.dim=8", "no weights of the five rules"),
+        ("vsa=hrr rule=least_squares", "the rule least_squares cannot train programs of HRR"),
+        ("vsa=hrr rule@paper.rule=least_squares", "the rule least_squares cannot train programs of HRR"),
+        ("paper.rule=least_squares", "paper.rule=least_squares: to choose an option, write rule@paper.rule="),
+        ("composition.weights={nobody:2}", "nobody"),
         ("encoder.bins=0", "bins"),
         ("encoder.nonsense=3", "nonsense"),
-        ("arena.preset=nowhere", "'nowhere'"),
-        ("body.name=legged", "legged"),
-        ("demonstrations=0", "episode"),
-        ("seconds=-1", "-1"),
-        ("seed=-1", "-1"),
-        ("workers=0", "workers"),
+        ("arena.gap=9", "gap"),
+        ("body=legged", "body: there is no 'legged'; choose from planar, wheeled"),
+        ("demonstrations=0", "demonstrations=0: expected 1 or more"),
+        ("paper_bins=[0]", "paper_bins=[0]: expected 1 or more"),
+        ("seconds=-1", "seconds=-1: expected more than 0"),
+        ("seed=-1", "seed=-1"),
+        ("workers=0", "workers=0"),
         ("rule.margin=-1", "margin"),
+        ("demonstrations_file=nowhere.safetensors", "nowhere.safetensors"),
         ("hydra.run.dir=/dev/null/results", "/dev/null"),
     ],
 )
-def test_one_line_names_what_is_wrong(tmp_path: Path, override: str, words: str) -> None:
-    run = corral(tmp_path, *SMALL, override)
-    assert_refused(run, words, tmp_path)
-
-
-def test_the_traceback_is_there_for_those_who_ask(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("HYDRA_FULL_ERROR", "1")
-    run = corral(tmp_path, *SMALL, "controllers=[nobody]")
-    assert run.returncode == 1
-    assert "Traceback" in run.stderr
+def test_one_line_names_what_is_wrong(refused: Refused, overrides: str, words: str) -> None:
+    assert words in refused(*overrides.split())
 
 
 READINGS = torch.tensor([[5.0, 5.0, 0.5], [1.0, 1.0, 0.5]], dtype=torch.float64)
@@ -62,15 +77,19 @@ READINGS = torch.tensor([[5.0, 5.0, 0.5], [1.0, 1.0, 0.5]], dtype=torch.float64)
         (READINGS + 1, "sensor 'light_left' reads 6 in row 0; its range is [0, 5] m"),
         (READINGS * torch.inf, "infinite value in row 0, column 0"),
         (READINGS[:0], "needs at least one row"),
-        (torch.full_like(READINGS, torch.nan), "row 0 of the demonstrations has no observed sensor"),
     ],
 )
-def test_a_file_of_demonstrations_that_does_not_fit(tmp_path: Path, readings: torch.Tensor, words: str) -> None:
-    shown = tmp_path / "shown.safetensors"
+def test_a_file_of_demonstrations_that_does_not_fit(
+    refused: Refused, tmp_path: Path, readings: torch.Tensor, words: str
+) -> None:
     tensors = {"sensors": readings, "commands": torch.ones(len(readings), 2, dtype=torch.float64)}
-    save_tensors(shown, "demonstrations", tensors | {"episodes": torch.zeros(len(readings), dtype=torch.int64)}, {})
-    assert_refused(corral(tmp_path, *SMALL, f"demonstrations_file={shown}", "controllers=[default]"), words, tmp_path)
+    tensors["episodes"] = torch.zeros(len(readings), dtype=torch.int64)
+    save_tensors(tmp_path / "shown.safetensors", "demonstrations", tensors, {})
+    assert words in refused("demonstrations_file=shown.safetensors", "controllers=[default]")
 
 
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    assert_refused(corral(tmp_path, "demonstrations_file=nowhere.safetensors"), "nowhere.safetensors", tmp_path)
+def test_a_file_without_any_observed_sensor(refused: Refused, tmp_path: Path) -> None:
+    tensors = {"sensors": torch.full_like(READINGS, torch.nan), "commands": torch.ones(2, 2, dtype=torch.float64)}
+    save_tensors(tmp_path / "shown.safetensors", "demonstrations", tensors | {"episodes": torch.zeros(2).long()}, {})
+    words = "row 0 of the demonstrations has no observed sensor"
+    assert words in refused("demonstrations_file=shown.safetensors", "controllers=[default]", "starts=1", "workers=1")

@@ -3,20 +3,37 @@
 import io
 from collections import Counter
 from collections.abc import Iterator
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 import torch
 from PIL import Image
-from small_run import STARTS, one_thread, small_run
+from small_run import STARTS, held_out, material, one_thread, program, rollout, settings
 
 import sim
 from behaviours import Demonstrations
-from experiments import corral_text, figures
-from experiments.command_map import COMMANDS, DISTANCE, LEFT, RIGHT, SLICES, Slice, command_map, kinds
-from experiments.failures import PLACES, failures, on_the_edge
-from experiments.forgetting import CLIPPED, DEFAULT, MEAN, PRINTED, SUM, Recalled, learners, recalled
-from experiments.timeline import telling_episode, timeline
+from experiments.corral import figures, text
+from experiments.corral.command_map import COMMANDS, DISTANCE, LEFT, RIGHT, SLICES, Slice, command_map, kinds
+from experiments.corral.failures import PLACES, ambiguous_share, ends, mistakes, unlike_teacher
+from experiments.corral.forgetting import (
+    CLIPPED,
+    DEFAULT,
+    MEAN,
+    PRINTED,
+    SUM,
+    by_age,
+    learners,
+    most_frequent,
+    recalled,
+)
+from experiments.corral.map_figure import command_maps
+from experiments.corral.measure import driven
+from experiments.corral.tables import failing
+from experiments.corral.trajectories import as_rollout, control_steps, representative_episode, timeline
+from experiments.kit.figures import png
 
 NAMES = {(1, 1): "forward", (-1, 1): "turn left", (1, -1): "turn right"}
 
@@ -27,8 +44,17 @@ def single_thread() -> Iterator[None]:
         yield
 
 
-def name_of(command: np.ndarray) -> str:
+def name_of(command: Any) -> str:
     return NAMES.get(tuple(np.sign(command).astype(int).tolist()), "other")
+
+
+def episodes(*names: str) -> pd.DataFrame:
+    return pd.concat([pd.DataFrame(driven(rollout(name))).assign(controller=name) for name in names])
+
+
+def bins_of(name: str) -> int:
+    encoder: Any = program(name).space.encoder
+    return encoder.bins
 
 
 def test_commands_have_names() -> None:
@@ -40,199 +66,189 @@ def test_commands_have_names() -> None:
 @pytest.mark.parametrize("who", ["default", "bundled", "paper_best_bins"])
 @pytest.mark.parametrize("plane", SLICES, ids=lambda plane: plane.title)
 def test_a_map_is_the_recall_cell_by_cell(who: str, plane: Slice) -> None:
-    run = small_run()
-    mind = run.controllers[who].mind
-    assert mind is not None
-    shown = command_map(mind, plane, run.heldout)
-    bins = mind.space.encoder.bins
-    assert shown.learned.shape == (bins, bins)
-    teacher = sim.Teacher()
-    for row in range(bins):
-        for column in range(bins):
-            reading = np.empty(3)
-            for sensor, place in ((plane.x, column), (plane.y, row)):
-                high = sim.SENSORS[sensor].high
-                reading[sensor] = high if place == bins - 1 else high * (place + 0.5) / bins
-            high = sim.SENSORS[plane.third].high
-            place = min(int(plane.fixed / high * bins), bins - 1)
-            reading[plane.third] = high if place == bins - 1 else high * (place + 0.5) / bins
-            np.testing.assert_allclose(shown.readings[row, column], reading)
-            assert COMMANDS[shown.learned[row, column]] == name_of(mind(reading[None]).commands[0].numpy())
-            assert COMMANDS[shown.teacher[row, column]] == name_of(teacher(reading[None])[0])
-    np.testing.assert_array_equal(shown.differs, shown.learned != shown.teacher)
+    bins, teacher = bins_of(who), sim.Teacher()
+    shown = command_map(program(who), bins, plane, held_out())
+    assert len(shown) == bins**2
+    for cell in shown.to_dict(orient="records"):
+        reading = np.empty(3)
+        for sensor, place in ((plane.x, cell["column"]), (plane.y, cell["row"])):
+            high = sim.SENSORS[sensor].high
+            reading[sensor] = high if place == bins - 1 else high * (place + 0.5) / bins
+        high = sim.SENSORS[plane.third].high
+        place = min(int(plane.fixed / high * bins), bins - 1)
+        reading[plane.third] = high if place == bins - 1 else high * (place + 0.5) / bins
+        np.testing.assert_allclose([cell[sensor.name] for sensor in sim.SENSORS], reading)
+        assert COMMANDS[cell["learned"]] == name_of(program(who)(reading[None]).commands[0].numpy())
+        assert COMMANDS[cell["teacher"]] == name_of(teacher(reading[None])[0])
 
 
 def test_a_map_counts_the_samples_of_its_slice() -> None:
-    run = small_run()
-    mind = run.controllers["default"].mind
-    assert mind is not None
-    shown = command_map(mind, Slice(RIGHT, DISTANCE, 5.0, "left light dark"), run.heldout)
+    shown = command_map(program("default"), 8, Slice(RIGHT, DISTANCE, 5.0, "left light dark"), held_out())
     expected = np.zeros((8, 8), dtype=int)
-    for left, right, distance in run.heldout.sensors.tolist():
+    for left, right, distance in held_out().sensors.tolist():
         if left >= 5.0:
             expected[min(int(distance / 0.6 * 8), 7), min(int(right / 5 * 8), 7)] += 1
-    np.testing.assert_array_equal(shown.met, expected)
+    np.testing.assert_array_equal(shown.samples.to_numpy().reshape(8, 8), expected)
     assert expected.sum() > 0
-    lit = command_map(mind, Slice(LEFT, RIGHT, 0.1, "wall near"), run.heldout)
-    assert lit.met.sum() == int((run.heldout.sensors[:, 2] < 0.22).sum())
+    lit = command_map(program("default"), 8, Slice(LEFT, RIGHT, 0.1, "wall near"), held_out())
+    assert lit.samples.sum() == int((held_out().sensors[:, 2] < 0.22).sum())
 
 
 @pytest.fixture(scope="module")
-def panel() -> Recalled:
-    run = small_run()
-    return recalled(learners(run.results.config, 4), run.train)
+def panel() -> pd.DataFrame:
+    return recalled(learners(settings(), 4), material().moving).assign(bins=4)
 
 
-def test_recall_by_age_against_asking_one_by_one(panel: Recalled) -> None:
-    run = small_run()
-    rules = learners(run.results.config, 4)
+def test_recall_by_age_against_asking_one_by_one(panel: pd.DataFrame) -> None:
+    rules, train = learners(settings(), 4), material().moving
     commands: dict[tuple[int, ...], set[str]] = {}
     readings: dict[tuple[int, ...], torch.Tensor] = {}
     space = rules[DEFAULT][0]
-    for reading, command in zip(run.train.sensors, run.train.commands.numpy(), strict=True):
+    for reading, command in zip(train.sensors, train.commands.numpy(), strict=True):
         condition = tuple(space.cells(reading[None])[0].tolist())
         commands.setdefault(condition, set()).add(name_of(command))
         readings.setdefault(condition, reading)
     order = list(commands)
     single = [condition for condition in order if len(commands[condition]) == 1]
     assert len(single) < len(order)
-    assert panel.conditions == len(order)
+    assert set(panel.conditions) == {len(order)}
     assert panel.age.tolist() == [len(order) - 1 - order.index(condition) for condition in single]
     favourite = Counter(next(iter(commands[condition])) for condition in single).most_common(1)[0][1]
-    assert panel.guess == pytest.approx(favourite / len(single))
+    assert most_frequent(panel) == pytest.approx(favourite / len(single))
     for learner, (space, rule) in rules.items():
-        behaviour = rule.fit(space, run.train)
+        behaviour = rule.fit(space, train)
         right = [
             name_of(behaviour(readings[condition][None]).commands[0].numpy()) in commands[condition]
             for condition in single
         ]
-        assert panel.right[learner].tolist() == right, learner
-        assert panel.share(learner) == pytest.approx(np.mean(right))
+        assert panel[learner].tolist() == right, learner
 
 
 def test_groups_of_equal_age() -> None:
-    right = np.arange(20) >= 10
-    panel = Recalled(4, 20, np.arange(20)[::-1], 0.5, {MEAN: right})
-    age, recall = panel.by_age(MEAN)
-    assert age.tolist() == [14.5, 4.5]
-    assert recall.tolist() == [0.0, 1.0]
+    groups = by_age(pd.DataFrame({"age": np.arange(20)[::-1], MEAN: np.arange(20) >= 10}), MEAN)
+    assert groups.age.tolist() == [14.5, 4.5]
+    assert groups.recall.tolist() == [0.0, 1.0]
 
 
 def test_conditions_that_all_contradict_are_no_basis() -> None:
-    config = small_run().results.config
     shown = Demonstrations([[1.0, 1.0, 0.3]] * 2, [[1.0, 1.0], [-1.0, 1.0]])
-    panel = recalled(learners(config, 4), shown)
-    assert (panel.conditions, len(panel.age)) == (1, 0)
+    assert recalled(learners(settings(), 4), shown).empty
 
 
 def test_the_words_follow_the_numbers() -> None:
     count = 40
     rights = {PRINTED: 0.5, CLIPPED: 0.25, MEAN: 0.25, SUM: 0.25, DEFAULT: 1.0}
-    right = {name: np.arange(count) >= count * (1 - share) for name, share in rights.items()}
-    panel = Recalled(8, count, np.arange(count)[::-1], 0.5, right)
-    text, reason = corral_text.recall_summary(panel, {"clip_each_step": True})
-    assert "as printed, the program recalls 50 %" in text
-    assert "25 %: 100 % of the newest 8, 0 % of the oldest 8." in text
-    assert "The largest gain comes from the default's rule and encoding (+75.0 points)." in text
+    panel = pd.DataFrame({name: np.arange(count) >= count * (1 - share) for name, share in rights.items()})
+    panel = panel.assign(bins=8, age=np.arange(count)[::-1])
+    words, reason = text.recall_summary(panel, {"clip_each_step": True})
+    assert "as printed, the program recalls 50 %" in words
+    assert "25 %: 100 % of the newest 8, 0 % of the oldest 8." in words
+    assert "The largest gain comes from the default's rule and encoding (+75.0 points)." in words
     assert "clip" in reason
-    assert len(corral_text.recall_summary(panel, {"clip_each_step": False})) == 1
-    same = Recalled(8, count, panel.age, 0.5, dict.fromkeys(rights, np.ones(count, dtype=bool)))
-    (text,) = corral_text.recall_summary(same, {"clip_each_step": True})
-    assert text.endswith("None of these steps gains anything here.")
+    assert len(text.recall_summary(panel, {"clip_each_step": False})) == 1
+    (words,) = text.recall_summary(panel.assign(**dict.fromkeys(rights, True)), {"clip_each_step": True})
+    assert words.endswith("None of these steps gains anything here.")
 
 
 @pytest.mark.parametrize("who", ["default", "bundled"])
 def test_a_timeline_is_the_recall_moment_by_moment(who: str) -> None:
-    run = small_run()
-    mind = run.controllers[who].mind
-    assert mind is not None
-    line = timeline(who, mind, run.rollouts[who], 2)
-    path = run.rollouts[who].slice(2)
-    assert line.seconds[-1] == pytest.approx((len(path) - 1) / 20)
+    path = rollout(who).slice(2)
+    line = timeline(control_steps(rollout(who), STARTS, program(who)), 2)
+    assert line.seconds.iloc[-1] == pytest.approx((len(path) - 1) / 20)
     for at in range(0, len(path), 25):
-        recall = mind(path.sensors[at][None])
-        for column, value in ((line.similarity, recall.similarity), (line.familiarity, recall.familiarity)):
-            assert column[at] == pytest.approx(float(value[0]), abs=1e-6)
-        assert line.margin[at] == pytest.approx(float(recall.margin[0]), abs=1e-6)
+        recall = program(who)(path.sensors[at][None])
+        for column in ("similarity", "familiarity", "margin"):
+            assert line[column].tolist()[at] == pytest.approx(float(getattr(recall, column)[0]), abs=1e-6)
         teacher = sim.Teacher()(path.sensors[at][None])[0]
-        assert line.differs[at] == (name_of(recall.commands[0].numpy()) != name_of(teacher))
-        if recall.speaker is not None and line.speaker is not None:
-            assert line.speaker[at] == int(recall.speaker[0])
-    assert (line.speaker is None) == (who == "default")
+        assert line.differs.tolist()[at] == (name_of(recall.commands[0].numpy()) != name_of(teacher))
+        if recall.speaker is not None:
+            assert line.speaker.tolist()[at] == list(sim.BEHAVIOURS)[int(recall.speaker[0])]
+    assert ("speaker" in line) == (who == "bundled")
 
 
-def test_the_telling_episode_succeeds_and_shows_everything() -> None:
-    rollout = small_run().rollouts["teacher"]
-    chosen = telling_episode([rollout])
-    assert chosen is not None
+def test_a_rollout_comes_back_from_its_frames() -> None:
+    one = rollout("paper")
+    again = as_rollout(control_steps(one, [0, 1, 5]), episodes("paper"), one.arena, one.seed, one.seconds)
+    assert again.summary().success_rate == one.success[[0, 1, 5]].mean()
+    for episode in (0, 1, 5):
+        for name in ("x", "heading", "sensors", "commands", "at_lamp"):
+            np.testing.assert_array_equal(getattr(again.slice(episode), name), getattr(one.slice(episode), name))
+    np.testing.assert_array_equal(again.start, one.start[[0, 1, 5]])
+
+
+def test_the_representative_episode_succeeds_and_shows_everything() -> None:
+    teacher = rollout("teacher")
+    chosen = representative_episode(episodes("teacher"), ["teacher"])
     scores = {}
     for episode in STARTS:
-        rules = set(sim.Teacher().rule(rollout.slice(episode).sensors).tolist())
+        rules = set(sim.Teacher().rule(teacher.slice(episode).sensors).tolist())
         shown = sum(bool(rules & set(of)) for of in sim.BEHAVIOURS.values())
-        scores[episode] = shown + 3 * bool(rollout.success[episode])
+        scores[episode] = shown + 3 * bool(teacher.success[episode])
     best = [episode for episode in STARTS if scores[episode] == max(scores.values())]
-    lengths = sorted((len(rollout.slice(episode)), episode) for episode in best)
+    lengths = sorted((len(teacher.slice(episode)), episode) for episode in best)
     assert chosen == lengths[(len(lengths) - 1) // 2][1]
-    assert telling_episode([]) is None
+    assert representative_episode(episodes("teacher"), []) is None
 
 
 @pytest.mark.parametrize("who", ["random", "paper"])
 def test_failures_against_a_walk_through_the_episodes(who: str) -> None:
-    rollout = small_run().rollouts[who]
-    found = failures(rollout)
-    failed = [episode for episode in STARTS if not rollout.success[episode]]
-    assert found.episodes.tolist() == failed
+    one = rollout(who)
+    failed = [episode for episode in STARTS if not one.success[episode]]
     assert failed
-    mistakes: Counter[tuple[str, str]] = Counter()
+    found: Counter[tuple[str, str]] = Counter()
     places: Counter[str] = Counter()
     steps = 0
     for episode in failed:
-        path = rollout.slice(episode)
+        path = one.slice(episode)
         steps += len(path)
         for sensors, command in zip(path.sensors, path.commands, strict=True):
             rule = int(sim.Teacher().rule(sensors[None])[0])
             given = COMMANDS[int(kinds(command[None])[0])]
             if given != name_of(sim.Teacher()(sensors[None])[0]):
-                mistakes[sim.TEACHER_RULES[rule], given] += 1
-        inside = max(abs(path.x[-1]), abs(path.y[-1])) < rollout.arena.side / 2
+                found[sim.TEACHER_RULES[rule], given] += 1
+        inside = max(abs(path.x[-1]), abs(path.y[-1])) < one.arena.side / 2
         places[PLACES[2] if path.at_lamp[-1] else PLACES[0] if inside else PLACES[1]] += 1
-    assert found.ends == {place: places[place] for place in PLACES}
-    assert found.wrong == pytest.approx(sum(mistakes.values()) / steps)
-    assert {(m.rule, m.command): round(m.share * steps) for m in found.mistakes} == mistakes
-    shares = [mistake.share for mistake in found.mistakes]
-    assert shares == sorted(shares, reverse=True)
+    (row,) = failing(episodes(who), [who])
+    assert (row["failed"], row["of"]) == (len(failed), len(STARTS))
+    assert {place: row[place] for place in PLACES} == {place: places[place] for place in PLACES}
+    assert row["unlike_teacher"] == pytest.approx(sum(found.values()) / steps)
+    rows = mistakes(one)
+    assert {(row["rule"], row["command"]): round(row["share"] * steps) for row in rows} == dict(found)
+    assert [row["share"] for row in rows] == sorted((row["share"] for row in rows), reverse=True)
 
 
-def test_no_failures_of_a_perfect_rollout() -> None:
-    rollout = small_run().rollouts["teacher"]
-    perfect = sim.Rollout(**{**vars(rollout), "success": np.ones(len(rollout), dtype=bool)})
-    found = failures(perfect)
-    assert (len(found.episodes), found.wrong, found.mistakes, sum(found.ends.values())) == (0, 0.0, [], 0)
+def test_a_controller_that_never_fails_has_no_mistakes() -> None:
+    one = rollout("teacher")
+    solved = one.success
+    assert solved.any()
+    assert [end is None for end in ends(one)] == solved.tolist()
+    assert not unlike_teacher(one).any()
+    (row,) = failing(episodes("teacher").loc[lambda frame: frame.success], ["teacher"])
+    assert (row["failed"], row["unlike_teacher"]) == (0, None)
 
 
 @pytest.mark.parametrize("who", ["default", "paper", "bundled"])
 def test_differences_on_the_edge_of_a_threshold(who: str) -> None:
-    run = small_run()
-    mind = run.controllers[who].mind
-    assert mind is not None
+    behaviour, train = program(who), material().moving
     asked: dict[tuple[int, ...], set[str]] = {}
-    for part in (run.train, run.heldout):
-        for bins, command in zip(mind.space.cells(part.sensors).tolist(), part.commands.numpy(), strict=True):
+    for samples in (train, held_out()):
+        for bins, command in zip(
+            behaviour.space.cells(samples.sensors).tolist(), samples.commands.numpy(), strict=True
+        ):
             asked.setdefault(tuple(bins), set()).add(name_of(command))
     edge = []
-    answers = mind(run.heldout.sensors).commands.numpy()
-    conditions = mind.space.cells(run.heldout.sensors).tolist()
-    for bins, answer, command in zip(conditions, answers, run.heldout.commands.numpy(), strict=True):
+    answers = behaviour(held_out().sensors).commands.numpy()
+    conditions = behaviour.space.cells(held_out().sensors).tolist()
+    for bins, answer, command in zip(conditions, answers, held_out().commands.numpy(), strict=True):
         if name_of(answer) != name_of(command):
             edge.append(len(asked[tuple(bins)]) > 1)
     assert edge
-    assert on_the_edge(mind, run.train, run.heldout) == pytest.approx(np.mean(edge))
+    assert ambiguous_share(behaviour, train, held_out()) == pytest.approx(np.mean(edge))
 
 
 def test_the_success_chart_says_what_it_draws() -> None:
-    table = small_run().results.table
-    figure = figures.success(table)
-    (axes,) = figure.axes
+    table = [{"controller": name, **asdict(rollout(name).summary())} for name in ("teacher", "paper", "random")]
+    (axes,) = figures.success(table).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == [row["controller"] for row in table]
     dots = [line.get_xdata() for line in axes.lines if line.get_marker() == "o"]
     assert np.concatenate([np.atleast_1d(np.asarray(dot)) for dot in dots]).tolist() == [
@@ -244,31 +260,26 @@ def test_the_success_chart_says_what_it_draws() -> None:
     assert axes.get_ylim()[0] > axes.get_ylim()[1]
 
 
-def test_the_recall_figure_draws_the_numbers(panel: Recalled) -> None:
-    (axes,) = figures.forgetting([panel]).axes
-    drawn = {str(line.get_label()): line for line in axes.lines}
-    for learner in panel.right:
-        age, recall = panel.by_age(learner)
-        np.testing.assert_array_equal(drawn[learner].get_xdata(), age)
-        np.testing.assert_array_equal(drawn[learner].get_ydata(), recall)
+def test_the_recall_figure_draws_the_numbers(panel: pd.DataFrame) -> None:
+    (axes,) = figures.recall_by_age([panel]).axes
+    drawn = [np.stack([np.asarray(line.get_xdata()), np.asarray(line.get_ydata())]) for line in axes.lines]
+    for learner in (PRINTED, CLIPPED, MEAN, SUM, DEFAULT):
+        groups = by_age(panel, learner).sort_values(by="age")
+        assert any(np.array_equal(line, groups[["age", "recall"]].to_numpy().T) for line in drawn), learner
 
 
 def test_the_map_figure_draws_the_commands() -> None:
-    run = small_run()
-    mind = run.controllers["default"].mind
-    assert mind is not None
-    maps = [command_map(mind, plane, run.heldout) for plane in SLICES]
-    figure = figures.command_maps({"default": maps})
-    images = [axes.images[0].get_array() for axes in figure.axes]
-    for shown, (teacher, learned) in zip(maps, zip(images[: len(maps)], images[len(maps) :], strict=True), strict=True):
-        np.testing.assert_array_equal(np.asarray(teacher), shown.teacher)
-        np.testing.assert_array_equal(np.asarray(learned), shown.learned)
+    maps = {plane: command_map(program("default"), 8, plane, held_out()) for plane in SLICES}
+    figure = command_maps({"default": pd.concat(maps.values())})
+    images = [np.asarray(axes.images[0].get_array()).ravel() for axes in figure.axes]
+    for shown, teacher, learned in zip(maps.values(), images[:4], images[4:], strict=True):
+        np.testing.assert_array_equal(teacher, shown.teacher)
+        np.testing.assert_array_equal(learned, shown.learned)
 
 
 def test_figures_are_drawn_alike_each_time() -> None:
-    run = small_run()
-    shown = {"teacher": run.rollouts["teacher"]}
-    first, second = (figures.png(figures.trajectories(shown, [0, 1])) for _ in range(2))
+    shown = {"teacher": rollout("teacher")}
+    first, second = (png(figures.trajectories(shown, [0, 1])) for _ in range(2))
     assert first == second
     with Image.open(io.BytesIO(first)) as image:
         assert image.size[0] > 600

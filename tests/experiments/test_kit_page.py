@@ -1,0 +1,101 @@
+"""The page of a study: safe, self-contained, and drawn from what it is given."""
+
+import base64
+import io
+from html.parser import HTMLParser
+
+import pytest
+from PIL import Image
+
+from experiments.kit import Column, Page, Table
+
+HOSTILE = """</title><script>alert("1")</script><img src='https://a.org/x' onerror="alert(2)"> & `<b>{{ 7 * 7 }}`"""
+TINY = Image.new("RGB", (3, 2), "red")
+
+
+class Elements(HTMLParser):
+    """Tags with their attributes, and the visible text."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.words: list[str] = []
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_data(self, data: str) -> None:
+        self.words.append(data)
+
+    def links(self) -> list[str]:
+        """Everything that the page refers to."""
+        return [value or "" for _, attrs in self.tags for key, value in attrs.items() if key in ("src", "href")]
+
+
+def png() -> bytes:
+    buffer = io.BytesIO()
+    TINY.save(buffer, "PNG")
+    return buffer.getvalue()
+
+
+def embedded(html: str) -> list[bytes]:
+    return [base64.b64decode(link.split(",", 1)[1]) for link in Elements(html).links() if link.startswith("data:")]
+
+
+def test_hostile_text_stays_text() -> None:
+    page = Page(HOSTILE, HOSTILE, HOSTILE)
+    section = page.section(HOSTILE)
+    section.text(HOSTILE)
+    columns = [Column("a", HOSTILE), Column("b", HOSTILE)]
+    section.table(Table(HOSTILE, columns, HOSTILE).show([{"a": HOSTILE, "b": HOSTILE}]))
+    section.terms({HOSTILE: HOSTILE})
+    section.picture(png(), HOSTILE, HOSTILE)
+    section.code(HOSTILE, HOSTILE)
+    seen = Elements(page.html())
+    assert {"script", "b"}.isdisjoint(tag for tag, _ in seen.tags)
+    assert [tag for tag, _ in seen.tags].count("img") == 1
+    assert not any(key.startswith("on") for _, attrs in seen.tags for key in attrs)
+    assert all(link.startswith(("data:", "#")) for link in seen.links())
+    alts = [attrs["alt"] for tag, attrs in seen.tags if tag == "img"]
+    assert alts == [HOSTILE]
+    # Title twice, lead, headline, section title twice, text, five in the table, two terms, caption, code, caption.
+    assert "".join(seen.words).count("""<script>alert("1")</script>""") == 17
+    assert "49" not in "".join(seen.words)
+
+
+def test_backticks_become_code() -> None:
+    page = Page("t")
+    page.section("s").text("read `a < b` twice")
+    assert "<p>read <code>a &lt; b</code> twice</p>" in page.html()
+
+
+def test_what_is_no_picture_is_refused() -> None:
+    with pytest.raises(ValueError, match="PNG and GIF only"):
+        Page("t").section("s").picture(b"<svg onload=alert(1)>", "drawing")
+
+
+def test_pictures_come_back_as_they_were() -> None:
+    page = Page("t")
+    page.section("s").picture(png(), "red")
+    assert embedded(page.html()) == [png()]
+
+
+ROWS = [
+    {"name": "teacher", "rate": 1.0, "time": 5.0, "starts": 10},
+    {"name": "first", "rate": 0.8, "time": 9.0, "starts": 10},
+    {"name": "second", "rate": 0.4, "time": None, "starts": 10},
+]
+
+
+def marks(column: Column, rows: list[dict[str, object]]) -> list[str]:
+    return [cell.mark for cell in column.cells(rows)]
+
+
+def test_the_best_of_those_that_compete_is_marked_where_they_compare() -> None:
+    rate = Column("rate", best="max", among=lambda row: row["name"] != "teacher", alike="starts", bad=lambda x: x < 0.5)
+    assert marks(rate, ROWS) == ["", "best", "bad"]
+    assert marks(rate, [{**ROWS[0], "starts": 99}, *ROWS[1:]]) == ["", "best", "bad"]
+    assert marks(rate, [*ROWS[:2], {**ROWS[2], "starts": 99}]) == ["", "", "bad"]
+    assert marks(Column("time", best="min"), ROWS) == ["best", "", ""]
+    assert [cell.text for cell in Column("time", format=".1f").cells(ROWS)] == ["5.0", "9.0", "-"]
