@@ -17,7 +17,7 @@ import cloudpickle
 import joblib
 import numpy as np
 import torch
-from joblib.externals.loky import get_reusable_executor
+from joblib.executor import get_memmapping_executor
 from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
 
@@ -96,8 +96,8 @@ def processes(workers: int) -> Iterator[Executor | None]:
     if workers == 1 or _nested():
         yield None
         return
-    # Those of an earlier call are used again.
-    yield get_reusable_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
+    # Those of an earlier call are used again. Joblib keeps one pool; one of another class would break its next call.
+    yield get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
 
 
 def _begin(parent: int) -> None:
