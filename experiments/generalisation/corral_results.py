@@ -93,8 +93,8 @@ def headline(outcome: Outcome) -> str:
 
 
 FIXED = {"nearest neighbour": (BLACK, "X"), "decision tree": (BLACK, "h")}
-"""How baselines look, by their label."""
-ARENA_MARKERS = ("s", "^", "D", "P", "v")
+"""Baselines are black. What is fixed here and for the default is given to no other line."""
+ARENA_MARKERS = ("s", "^", "o", "P", "v")
 
 
 def curves(outcome: Outcome) -> Figure:
@@ -109,7 +109,7 @@ def curves(outcome: Outcome) -> Figure:
         (left, "heldout", "heldout_min", "heldout_max"),
         (right, "success_rate", "success_low", "success_high"),
     ):
-        order, fixed = list(labels.values()), {labels[default]: (BLUE, "o"), **FIXED}
+        order, fixed = list(labels.values()), {labels[default]: (BLUE, "D"), **FIXED}
         lines(axes, home, "demonstrations", value, "label", order=order, fixed=fixed)
         band = home.loc[home.learner == default].sort_values(by="demonstrations")
         axes.fill_between(band.demonstrations, band[low], band[high], color=BLUE, alpha=0.15, linewidth=0)
