@@ -55,5 +55,5 @@ def __getattr__(name: str) -> Any:
     except ModuleNotFoundError as error:
         if (error.name or "").partition(".")[0] != "sklearn":
             raise
-        raise ImportError(f"{name} needs scikit-learn: pip install 'torchvsa[corral]'", name="sklearn") from error
+        raise ImportError(f"{name} needs scikit-learn: pip install 'torchvsa[sklearn]'", name="sklearn") from error
     return getattr(estimators, name)

@@ -1,10 +1,11 @@
 """Reproducible studies, one file per question. The only place where robot and algebra meet."""
 
-try:
-    import hydra as _hydra
+from importlib.util import find_spec
 
-    import sim as _sim
-except ImportError as error:
-    raise ImportError(f"{error.name} is missing; the experiments need: pip install 'torchvsa[corral]'") from error
+_NEEDED = (
+    *("hydra", "hydra_plugins", "joblib", "cloudpickle", "pandas", "pyarrow", "seaborn", "matplotlib", "jinja2", "rich"),
+    *("sklearn", "scipy", "pybullet", "gymnasium"),
+)
 
-del _hydra, _sim
+if _missing := [name for name in _NEEDED if find_spec(name) is None]:
+    raise ImportError(f"{_missing[0]} is missing; the experiments need: pip install 'torchvsa[corral]'", name=_missing[0])

@@ -11,6 +11,8 @@ if "pybullet" not in sys.modules:
     try:
         os.dup2(_devnull, 2)
         import pybullet
+    except ImportError as error:
+        raise ImportError("the simulator needs pybullet: pip install 'torchvsa[sim]'", name="pybullet") from error
     finally:
         os.dup2(_stderr, 2)
         os.close(_devnull)

@@ -26,13 +26,13 @@ def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
     check_all(study, settings)
     began = time.perf_counter()
     config = config_of(settings)
-    if not settings.fresh and finished(folder, study, config):
-        console.print(f"{folder} holds the results of these settings; fresh=true begins anew", soft_wrap=True)
-        return load(folder, study)[1]
-    folder.mkdir(parents=True, exist_ok=True)
     cells = study.cells(settings)
     kept = store.Cells(folder, study.name, config, settings.fresh)
     missing = [cell for cell in cells if kept.find(cell) is None]
+    if not missing and finished(folder, study, config):
+        console.print(f"{folder} holds the results of these settings; fresh=true begins anew", soft_wrap=True)
+        return load(folder, study)[1]
+    folder.mkdir(parents=True, exist_ok=True)
     if len(missing) < len(cells):
         done = f"{len(cells) - len(missing)} of {len(cells)} cells"
         console.print(f"{folder} holds {done} of these settings; fresh=true begins anew", soft_wrap=True)

@@ -39,14 +39,17 @@ class Cells:
         self.path = folder / "cells.jsonl"
         self._run = [study, torchvsa.__version__, relevant(config)]
         self._known: dict[str, list[Row]] = {}
+        self._torn = ""
         if fresh:
             self.path.unlink(missing_ok=True)
         elif self.path.is_file():
-            for line in self.path.read_text().splitlines():
+            text = self.path.read_text()
+            self._torn = "" if text.endswith("\n") else "\n"  # a line that was being written when the run was killed
+            for line in text.splitlines():
                 try:
                     content = json.loads(line)
                 except json.JSONDecodeError:
-                    continue  # a line that was being written when the run was killed
+                    continue
                 self._known[content["key"]] = content["records"]
 
     def key(self, cell: Row) -> str:
@@ -61,10 +64,10 @@ class Cells:
         """Keep the records of a cell, on the disk before this returns."""
         key = self.key(cell)
         with self.path.open("a") as file:
-            file.write(json.dumps({"key": key, "cell": cell, "records": records}) + "\n")
+            file.write(self._torn + json.dumps({"key": key, "cell": cell, "records": records}) + "\n")
             file.flush()
             os.fsync(file.fileno())
-        self._known[key] = records
+        self._known[key], self._torn = records, ""
 
 
 def relevant(config: Mapping[str, Any]) -> Row:

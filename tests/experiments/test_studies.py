@@ -18,7 +18,7 @@ NAMES = ("capacity", "corral", "generalisation", "observability", "robustness", 
 
 def test_the_studies_are_all_there() -> None:
     assert experiments.studies
-    assert [name for name in STUDIES if name in NAMES] == sorted(NAMES)
+    assert set(NAMES) <= set(STUDIES)
 
 
 @pytest.mark.parametrize("name", NAMES)
