@@ -1,5 +1,5 @@
 """All studies: importing this module registers them."""
 
-from experiments import capacity, corral, generalisation, robustness
+from experiments import capacity, corral, generalisation, observability, robustness
 
-__all__ = ["capacity", "corral", "generalisation", "robustness"]
+__all__ = ["capacity", "corral", "generalisation", "observability", "robustness"]
