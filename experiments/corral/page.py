@@ -168,7 +168,8 @@ def _printed(run: Run, page: Page) -> None:
     if not names:
         return
     section = page.section("Why the printed algorithm does what it does")
-    counts = [row for row in tables.learning(run.outcome.records) if row["controller"] in names]
+    learned = {row["controller"]: row for row in tables.learning(run.outcome.records)}
+    counts = [learned[name] for name in names]
     section.table(tables.COUNTS.show(counts))
     section.text(*(text.counts_summary(row) for row in counts))
     records = run.outcome.records

@@ -71,7 +71,8 @@ MAIN = Table(
             "bins", format=".0f", about="bins of equal width per sensor; - for controllers that see raw readings"
         ),
         Column(
-            "query_us", "µs", ",.0f", about="median time of one answer for one robot, on the machine that ran this"
+            "query_us", "µs", ",.0f",
+            about="median time of one answer for one robot, on the machine that ran this, with its workers busy",
         ),
     ],
     "Green: the best of its column, without the teachers, and only where all were measured on the same starts: success "
