@@ -3,22 +3,21 @@
 from importlib.util import find_spec
 
 _NEEDED = (
-    *(
-        "hydra",
-        "hydra_plugins",
-        "joblib",
-        "cloudpickle",
-        "pandas",
-        "pyarrow",
-        "seaborn",
-        "matplotlib",
-        "jinja2",
-        "rich",
-    ),
-    *("sklearn", "scipy", "pybullet", "gymnasium"),
+    "hydra",
+    "hydra_plugins",
+    "joblib",
+    "cloudpickle",
+    "pandas",
+    "pyarrow",
+    "seaborn",
+    "matplotlib",
+    "jinja2",
+    "rich",
+    "sklearn",
+    "scipy",
+    "pybullet",
+    "gymnasium",
 )
 
-if _missing := [name for name in _NEEDED if find_spec(name) is None]:
-    raise ImportError(
-        f"{_missing[0]} is missing; the experiments need: pip install 'torchvsa[corral]'", name=_missing[0]
-    )
+if _missing := next((name for name in _NEEDED if find_spec(name) is None), None):
+    raise ImportError(f"{_missing} is missing; the experiments need: pip install 'torchvsa[corral]'", name=_missing)

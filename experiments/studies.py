@@ -22,8 +22,9 @@ for _module in pkgutil.iter_modules(experiments.__path__):
 
 
 def settings_page() -> str:
-    """All settings of all studies, and the options of all groups, as a page of the docs."""
-    studies = "\n\n".join(markdown(study) for _, study in sorted(STUDIES.items()))
-    used = dict.fromkeys(group for _, study in sorted(STUDIES.items()) for group in groups(study.settings))
+    """All settings of the studies of this project, and the options of all groups, as a page of the docs."""
+    here = [study for _, study in sorted(STUDIES.items()) if study.settings.__module__.startswith("experiments.")]
+    studies = "\n\n".join(map(markdown, here))
+    used = dict.fromkeys(group for study in here for group in groups(study.settings))
     options = "\n\n".join(markdown_of_group(group) for group in used)
     return f"{_TITLE}\n{studies}\n\n{options}\n"

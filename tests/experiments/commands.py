@@ -10,16 +10,10 @@ SMALL = ("demonstrations=6", "starts=6", "other_starts=4", "wheeled_starts=2", "
 """A job of seconds instead of minutes; what it shows is not meant to be good."""
 
 
-def corral(folder: Path, *overrides: str, module: str = "experiments.corral") -> subprocess.CompletedProcess[str]:
-    """Run the main job in `folder` with hydra overrides."""
-    return subprocess.run(
-        [sys.executable, "-m", module, *overrides], cwd=folder, capture_output=True, text=True, check=False, timeout=500
-    )
-
-
-def output_of(folder: Path, *overrides: str, module: str = "experiments.corral") -> str:
-    """What such a run prints, which must not fail."""
-    run = corral(folder, *overrides, module=module)
+def output_of(folder: Path, study: str, *overrides: str) -> str:
+    """What the command of a study prints in `folder`; it must not fail."""
+    command = [sys.executable, "-m", "experiments", study, *overrides]
+    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=500)
     assert run.returncode == 0, run.stderr
     return run.stdout
 

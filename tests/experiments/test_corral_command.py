@@ -24,7 +24,7 @@ ROWS = "controllers=[teacher,default,paper,paper_best_bins,bundled,hand_written,
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A small run of most rows: its folder and what the terminal showed."""
     folder = tmp_path_factory.mktemp("run")
-    return folder, output_of(folder, *SMALL, ROWS, "paper_bins=[2]")
+    return folder, output_of(folder, "corral", *SMALL, ROWS, "paper_bins=[2]")
 
 
 def episodes(folder: Path) -> list[Row]:
@@ -97,8 +97,13 @@ def test_what_was_learned_is_kept_and_can_be_learned_again(finished: tuple[Path,
     demonstrations = Demonstrations.load(shown)
     assert len(demonstrations.episodes.unique()) == 6
     shutil.copy(shown, tmp_path / "shown.safetensors")
-    output_of(
-        tmp_path, *SMALL, "demonstrations_file=shown.safetensors", "controllers=[default]", "animate=false", "workers=1"
+    own = ("demonstrations_file=shown.safetensors", "controllers=[default]", "animate=false", "workers=1")
+    output_of(tmp_path, "corral", *SMALL, *own)
+    again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
+        "demonstrations_file=shown.safetensors",
+        "controllers=[default]",
+        "animate=false",
+        "workers=1",
     )
     again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
     assert torch.equal(again["default"].program, bank["default"].program)

@@ -158,7 +158,7 @@ def test_wrong_settings_are_named(override: str, words: str) -> None:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("generalisation")
-    return folder, output_of(folder, "generalisation", *TINY, "workers=2", module="experiments")
+    return folder, output_of(folder, "generalisation", *TINY, "workers=2")
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:

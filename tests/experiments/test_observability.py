@@ -201,7 +201,7 @@ def test_the_slowest_cells_come_first_and_memories_of_gaps_only_where_there_are_
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A tiny run."""
     folder = tmp_path_factory.mktemp("observability")
-    assert "balanced" in output_of(folder, "observability", *SMALL, "workers=1", module="experiments")
+    assert "balanced" in output_of(folder, "observability", *SMALL, "workers=1")
     return folder
 
 

@@ -262,7 +262,7 @@ TINY = (
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("robustness")
-    return folder, output_of(folder, "robustness", *TINY, module="experiments")
+    return folder, output_of(folder, "robustness", *TINY)
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:

@@ -118,7 +118,7 @@ def test_wrong_settings_are_named(override: str, words: str) -> None:
 
 
 def test_the_command_writes_table_and_page(tmp_path: Path) -> None:
-    printed = output_of(tmp_path, "smooth", *TINY, module="experiments")
+    printed = output_of(tmp_path, "smooth", *TINY)
     content = results(tmp_path)
     rows = {(row["model"], row["dim"]): row for row in content["table"]}
     assert list(rows) == [("teacher", None), ("one_hypervector", 200), ("one_hypervector", 50), ("ridge", None)]

@@ -121,7 +121,7 @@ def test_wrong_settings_are_named(overrides: str, words: str) -> None:
 
 
 def test_the_command_writes_table_records_and_page(tmp_path: Path) -> None:
-    printed = output_of(tmp_path, "wall_following", *TINY, module="experiments")
+    printed = output_of(tmp_path, "wall_following", *TINY)
     content = results(tmp_path)
     records = pq.read_table(only(tmp_path, "records.parquet")).to_pylist()
     accuracies = [record["accuracy"] for record in records if record["model"] == "decision_tree"]
