@@ -204,7 +204,7 @@ def learning(records: pd.DataFrame) -> list[Row]:
 
 
 def episodes_of(records: pd.DataFrame) -> pd.DataFrame:
-    """The driven episodes, with the types that a frame of other rows besides cannot keep."""
+    """The driven episodes, with the types that a frame with other rows in it loses."""
     return records.loc[records.kind == "episode", list(EPISODE)].astype(EPISODE)
 
 
