@@ -1,11 +1,12 @@
 # `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs;
-# `make bench` measures speed beside peers; `make fuzz` loads 200,000 damaged files.
+# `make bench` measures speed compared with peers; `make fuzz` loads 200,000 damaged files; `make combinations` drives
+# every rule x architecture x protection x record.
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: run test lint bench fuzz
+.PHONY: run test lint bench combinations fuzz
 
 run: $(INSTALLED)
 	$(BIN)/python -m experiments corral
@@ -16,6 +17,9 @@ test: $(INSTALLED) lint
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks
 	$(BIN)/python -m benchmarks.memory
+
+combinations: $(INSTALLED)
+	$(BIN)/python tests/experiments/combinations.py
 
 fuzz: $(INSTALLED)
 	$(BIN)/python tests/helpers/mutants.py --count 200000

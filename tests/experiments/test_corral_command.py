@@ -100,12 +100,6 @@ def test_what_was_learned_is_kept_and_can_be_learned_again(finished: tuple[Path,
     own = ("demonstrations_file=shown.safetensors", "controllers=[default]", "animate=false", "workers=1")
     output_of(tmp_path, "corral", *SMALL, *own)
     again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
-        "demonstrations_file=shown.safetensors",
-        "controllers=[default]",
-        "animate=false",
-        "workers=1",
-    )
-    again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
     assert torch.equal(again["default"].program, bank["default"].program)
     agreed = bank["default"](demonstrations.sensors).commands == demonstrations.commands
     assert agreed.all(-1).double().mean() > 0.95
