@@ -49,4 +49,7 @@ def _of_omegaconf(error: OmegaConfBaseException) -> str:
             r"Value '(.*?)' (?:(?:of type '.*?' )?could not be converted to (\w+)|is not a valid (\w+))", text
         ):
             return f"{key}={found[1]}: expected {KINDS.get(found[2] or found[3], found[2] or found[3])}"
-    return f"{key}: {' '.join(str(error.msg or error).split())}" if key else text
+        if "is not Optional" in text:
+            return f"{key}=null: expected a value"
+    text = text.partition(" full_key:")[0]
+    return text if not key or key in text else f"{key}: {text}"

@@ -102,7 +102,13 @@ def finished(folder: Path, study: Study, config: dict[str, Any]) -> bool:
 
 def load(folder: Path, study: Study | None = None) -> tuple[Study, Outcome]:
     """A study, by default the registered one, and what it found, from the folder of a finished run."""
-    content = json.loads((folder / "results.json").read_text())
+    path = folder / "results.json"
+    try:
+        content = json.loads(path.read_text())
+    except json.JSONDecodeError as error:
+        raise ValueError(f"{path} is not JSON: {error}") from error
+    if not isinstance(content, dict) or not {"study", "config", "table", "metrics", "provenance"} <= set(content):
+        raise ValueError(f"{path} does not hold the results of a study")
     study = study or STUDIES.find(content["study"])
     settings = settings_of(study, content["config"])
     records = pd.read_parquet(folder / "records.parquet")

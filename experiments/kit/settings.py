@@ -110,6 +110,8 @@ def check(given: object, prefix: str = "") -> None:
             check(value, f"{name}.")
         elif "group" in metadata and isinstance(value, str):
             raise ValueError(f"{name}={value}: to choose an option, write {metadata['group']}@{name}={value}")
+        elif "group" in metadata and value is None and metadata["option"] is not None:
+            raise ValueError(f"{name} is missing; choose an option of {metadata['group']}")
         elif "allowed" in metadata:
             _check(name, value, metadata)
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 import sim
-from behaviours import Actuator, Demonstrations, Schema, Sensor, Space
+from behaviours import Actuator, Behaviour, Demonstrations, Schema, Sensor, Space
 from experiments.kit import Part, Settings, part, parts, setting
 from experiments.kit.intervals import proportion
 from experiments.kit.options import GROUPS, Group
@@ -98,7 +98,12 @@ def drive(
     body: str | None = None,
     record: bool = False,
 ) -> sim.Rollout:
-    """Drive in this process, as a cell does."""
+    """Drive in this process, as a cell does.
+
+    A behaviour whose program holds integers drives in its frozen form, which gives the same bits faster.
+    """
+    if isinstance(policy, Behaviour) and not (policy.program.is_floating_point() or policy.program.is_complex()):
+        policy = policy.freeze()
     return sim.rollout(
         policy, arena, body or settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
         record=record,
