@@ -128,9 +128,9 @@ def agreement(material: Material, controller: Controller, held_out: Demonstratio
 
 
 def query_seconds(policy: sim.ControllerLike, readings: np.ndarray[Any, Any], calls: int = 200) -> float:
-    """Median time of one answer to one robot, over readings of the teacher's runs."""
+    """Median time of one answer to one robot in the form that drives, over readings of the teacher's runs."""
     rows = readings[np.linspace(0, len(readings) - 1, calls).astype(int)]
-    controller = sim.as_controller(policy)
+    controller = sim.as_controller(corral.frozen(policy))
     state = controller.start(np.zeros(1, dtype=np.int64))
     times = []
     for row in rows:

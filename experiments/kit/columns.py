@@ -1,8 +1,11 @@
 """Tables: their columns are declared once, and shown on the terminal, on a page and in Markdown.
 
 >>> table = Table("Recall", [Column("learner"), Column("recall", format=".2f", best="max")])
->>> table.show([{"learner": "one_shot", "recall": 0.9}, {"learner": "gradient", "recall": None}]).markdown()
-'| learner | recall |\n| --- | ---: |\n| one_shot | 0.90 |\n| gradient | - |'
+>>> print(table.show([{"learner": "one_shot", "recall": 0.9}, {"learner": "gradient", "recall": None}]).markdown())
+| learner | recall |
+| --- | ---: |
+| one_shot | 0.90 |
+| gradient | - |
 """
 
 from __future__ import annotations

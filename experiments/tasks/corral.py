@@ -90,6 +90,16 @@ def arena(options: parts.Options) -> sim.Arena:
     return sim.Arena(**{key: value for key, value in options.items() if key != "name"})
 
 
+def frozen(policy: sim.ControllerLike) -> sim.ControllerLike:
+    """The form in which a policy drives: frozen, if it is a behaviour whose program holds integers.
+
+    The frozen form of such a behaviour gives the same bits, and is faster.
+    """
+    if isinstance(policy, Behaviour) and not (policy.program.is_floating_point() or policy.program.is_complex()):
+        return policy.freeze()
+    return policy
+
+
 def drive(
     settings: Driving,
     policy: sim.ControllerLike,
@@ -98,14 +108,9 @@ def drive(
     body: str | None = None,
     record: bool = False,
 ) -> sim.Rollout:
-    """Drive in this process, as a cell does.
-
-    A behaviour whose program holds integers drives in its frozen form, which gives the same bits faster.
-    """
-    if isinstance(policy, Behaviour) and not (policy.program.is_floating_point() or policy.program.is_complex()):
-        policy = policy.freeze()
+    """Drive in this process, as a cell does."""
     return sim.rollout(
-        policy, arena, body or settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
+        frozen(policy), arena, body or settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
         record=record,
     )  # fmt: skip
 

@@ -1,0 +1,89 @@
+"""Tables: one declaration for terminal, page and Markdown; intervals; and the examples in the kit's docstrings."""
+
+import doctest
+import io
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+import sim
+from experiments.kit import Column, Table, columns, page, study
+from experiments.kit.intervals import bootstrap, proportion, wilson
+
+ROWS = [
+    {"name": "a", "rate": 0.5, "low": 0.25, "high": 0.75, "starts": 10, "seconds": 3.0, "note": None},
+    {"name": "b", "rate": 0.75, "low": 0.5, "high": 1.0, "starts": 20, "seconds": 2.0, "note": None},
+    {"name": "c", "rate": None, "low": None, "high": None, "starts": 1000, "seconds": float("nan"), "note": None},
+]
+TABLE = Table(
+    "Rates",
+    [
+        Column("name"),
+        Column("rate", "rate [95 %]", ".2f", ("low", "high"), best="max", alike="starts"),
+        Column("starts"),
+        Column("seconds", format=".1f", best="min"),
+        Column("note"),
+    ],
+).show(ROWS)
+
+
+@pytest.mark.parametrize("module", [columns, page, study])
+def test_the_examples_in_docstrings(module: object) -> None:
+    found = doctest.testmod(module)  # pyright: ignore[reportArgumentType]
+    assert found.failed == 0
+    assert found.attempted > 0
+
+
+def test_markdown_has_intervals_dashes_and_the_best_of_what_compares() -> None:
+    assert TABLE.markdown().splitlines() == [
+        "| name | rate [95 %] | starts | seconds |",
+        "| --- | ---: | ---: | ---: |",
+        "| a | 0.50 [0.25, 0.75] | 10 | 3.0 |",
+        "| b | 0.75 [0.50, 1.00] | 20 | **2.0** |",
+        "| c | - | 1,000 | - |",
+    ]
+
+
+def test_the_terminal_shows_the_same() -> None:
+    shown = io.StringIO()
+    Console(file=shown, width=100).print(TABLE.terminal())
+    for text in ("Rates", "0.50 [0.25, 0.75]", "1,000", "2.0"):
+        assert text in shown.getvalue()
+    assert "note" not in shown.getvalue()
+
+
+def test_nothing_is_best_among_equals_or_on_other_samples() -> None:
+    best = Column("rate", best="max", alike="starts")
+    assert not any(cell.mark for cell in best.cells(ROWS[:2]))
+    alike = [{**row, "starts": 10} for row in ROWS]
+    assert [cell.mark for cell in best.cells(alike)] == ["", "best", ""]
+    assert not any(cell.mark for cell in best.cells([alike[0], alike[0]]))
+    assert [cell.mark for cell in Column("rate", bad=lambda rate: rate < 0.6).cells(ROWS)] == ["bad", "", ""]
+
+
+@pytest.mark.parametrize(("successes", "trials"), [(0, 7), (3, 7), (7, 7), (999, 1000)])
+def test_wilsons_interval_is_that_of_the_simulator(successes: int, trials: int) -> None:
+    assert wilson(successes, trials) == pytest.approx(sim.wilson(successes, trials), abs=1e-12)
+    row = proportion("success", successes, trials)
+    assert row == {"success_rate": successes / trials, "success_low": wilson(successes, trials)[0],
+                   "success_high": wilson(successes, trials)[1]}  # fmt: skip
+
+
+def test_no_trials_have_no_interval() -> None:
+    assert proportion("x", 0, 0) == {"x_rate": None, "x_low": None, "x_high": None}
+    with pytest.raises(ValueError):  # noqa: PT011
+        wilson(2, 1)
+
+
+def test_the_bootstrap_covers_the_mean_about_as_often_as_it_says() -> None:
+    rng = np.random.default_rng(0)
+    covered = 0
+    for draw in range(200):
+        low, high = bootstrap(rng.normal(3.0, 1.0, 40).tolist(), seed=draw, draws=400)
+        covered += low <= 3.0 <= high
+    assert 0.88 <= covered / 200 <= 0.98  # 40 values make it a little narrow
+    assert bootstrap([1.0, 2.0, 4.0], seed=1) == bootstrap([1.0, 2.0, 4.0], seed=1)
+    assert np.isnan(bootstrap([1.0])).all()
+    with pytest.raises(ValueError, match="at least one value"):
+        bootstrap([])
