@@ -22,7 +22,7 @@ def test_a_sweep_of_the_main_job_is_collected(tmp_path: Path) -> None:
     corral = STUDIES["corral"]
     assert corral.objective is not None
     for dim, success in ((1000, 0.25), (4000, 0.75)):
-        settings = corral.settings(vsa={"name": "MAP-C", "dim": dim})
+        settings = composed(corral, f"vsa.dim={dim}")
         content = {"config": config_of(settings), "metrics": {corral.objective: success}}
         folder = tmp_path / "outputs" / "corral" / "sweep" / f"vsa.dim={dim}"
         folder.mkdir(parents=True)
