@@ -1,21 +1,23 @@
 """What the README says is true."""
 
+import json
 import re
-import subprocess
-import sys
+import tomllib
 from pathlib import Path
 
+import pytest
 import torch
+from packages import ROOT, python
 
-ROOT = Path(__file__).parents[1]
+import torchvsa
+
 README = (ROOT / "README.md").read_text()
 
+FIRST, SAVE, ALGEBRA, KINDS, PAPER, CLASSIFIER, SUMS, _ = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
-FIRST, KINDS, PAPER, CLASSIFIER, SUMS = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
-
-def run(code: str) -> str:
-    done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
+def run(code: str, cwd: Path | None = None) -> str:
+    done = python(None, code, "-W", "error", cwd=cwd)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -25,6 +27,21 @@ def test_the_first_lines_are_few_run_and_answer() -> None:
     code = FIRST + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
     code += "assert 'program' in steer.state_dict() and steer.program.shape == (4000,)\n"
     assert "program" in run(code)
+
+
+def test_a_saved_bank_holds_the_behaviour(tmp_path: Path) -> None:
+    save, load, load_state = SAVE.splitlines()
+    same = "torch.equal(again(readings).commands, steer(readings).commands)"
+    code = [FIRST, save, load, f"assert {same}", "again.program.zero_()", f"assert not {same}", load_state]
+    run("\n".join([*code, f"assert {same}"]), tmp_path)
+
+
+def test_the_algebra_finds_the_colour_of_the_ball() -> None:
+    similarities, index = run(ALGEBRA).splitlines()
+    red, blue = json.loads(similarities.removeprefix("tensor(").removesuffix(")"))
+    assert red == pytest.approx(0.5**0.5, abs=0.03)
+    assert abs(blue) < 0.08
+    assert index == "tensor(3)"
 
 
 def test_a_robot_with_sensors_of_all_kinds_drives_across_the_seam() -> None:
@@ -51,12 +68,18 @@ def test_the_files_that_it_names_are_there() -> None:
 
 def test_the_commands_are_targets_of_make() -> None:
     makefile = (ROOT / "Makefile").read_text()
-    for target in re.findall(r"^make (\w+)", README, re.MULTILINE):
+    for target in re.findall(r"\bmake (\w+)", "\n".join(re.findall(r"`[^`]*`|^make .*$", README, re.MULTILINE))):
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
 
 
-def test_the_version_is_said_once() -> None:
-    import torchvsa
+def test_the_extras_are_those_of_the_package() -> None:
+    extras = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    table = README.split("| extra | for |")[1].split("\n\n")[0]
+    assert set(re.findall(r"^\| `(\w+)`", table, re.MULTILINE)) == set(extras) - {"dev"}
 
+
+def test_the_version_is_said_once() -> None:
     assert f'version = "{torchvsa.__version__}"' in (ROOT / "pyproject.toml").read_text()
     assert torch.__version__.split("+")[0] == "2.13.0"
+    assert "torch==2.13.0" in README
+    assert "\ntorch==2.13.0\n" in (ROOT / "constraints.txt").read_text()
