@@ -10,7 +10,7 @@ import re
 import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any
 
@@ -50,7 +50,8 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
     with errors_in_one_line(study.name), ended_by_signals():
         refuse_code(given)
         register(study)
-        sys.argv[1:] = given  # where Hydra reads them
+        # Hydra reads them there, and takes settings on one side of its flags only.
+        sys.argv[1:] = sorted(given, key=lambda argument: argument not in ("--multirun", "-m"))
         hydra.main(version_base="1.3", config_path="pkg://experiments.kit.conf", config_name=study.name)(_Job(study))()
 
 
@@ -69,12 +70,17 @@ class _Job:
         # A sweep goes on after a job that failed, and Hydra then says which one it was.
         alone = HydraConfig.get().mode == RunMode.RUN
         with errors_in_one_line(study.name) if alone else nullcontext():
-            settings = runs.settings_of(study, cfg)
-            outcome = runs.run(study, settings, Path(HydraConfig.get().runtime.output_dir), console)
+            folder = Path(HydraConfig.get().runtime.output_dir)
+            try:
+                outcome = runs.run(study, runs.settings_of(study, cfg), folder, console)
+            except ValueError:
+                with suppress(OSError):
+                    folder.rmdir()  # which Hydra makes, also for settings that are refused
+                raise
         for table in study.shown(outcome):
             console.print(table.terminal())
         report = outcome.folder / "report.html"
-        console.print(f"{report} shows it; results.json and records.parquet lie beside it", soft_wrap=True)
+        console.print(f"{report} shows it; results.json and records.parquet are in the same folder", soft_wrap=True)
         return None if study.objective is None else outcome.metrics.get(study.objective)
 
 
