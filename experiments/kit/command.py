@@ -88,6 +88,7 @@ def register(study: Study) -> None:
     """Put the settings of a study, its presets and all options into Hydra's store."""
     store = ConfigStore.instance()
     register_groups()
+    store.repo.pop("experiment", None)  # presets of another study that this process ran
     for name, preset in study.presets.items():
         store.store(group="experiment", name=name, node=dict(preset), package="_global_")
     store.store(name=study.name, node=primary(study))

@@ -167,7 +167,7 @@ def test_without_scikit_learn_the_rest_works_and_the_error_says_what_to_install(
         return real(name, *args, **kwargs)
 
     monkeypatch.setattr(builtins, "__import__", without)
-    with pytest.raises(ImportError, match=r"BehaviourClassifier needs scikit-learn: pip install 'torchvsa\[corral\]'"):
+    with pytest.raises(ImportError, match=r"BehaviourClassifier needs scikit-learn: pip install 'torchvsa\[sklearn\]'"):
         _ = behaviours.BehaviourClassifier
     with pytest.raises(AttributeError, match="no attribute 'BehaviourGuesser'"):
         _ = behaviours.BehaviourGuesser  # pyright: ignore[reportAttributeAccessIssue]
