@@ -139,6 +139,7 @@ def errors_in_one_line(name: str) -> Iterator[None]:
 
     With HYDRA_FULL_ERROR=1 in the environment the whole traceback is shown instead.
     """
+    before = os.environ.get("HYDRA_FULL_ERROR")
     os.environ["HYDRA_FULL_ERROR"] = "1"  # makes Hydra raise, instead of printing a report of several lines itself
     try:
         yield
@@ -150,6 +151,11 @@ def errors_in_one_line(name: str) -> Iterator[None]:
             raise
         print(f"{name}: {in_words(error)}", file=sys.stderr)
         sys.exit(1)
+    finally:
+        if before is None:
+            del os.environ["HYDRA_FULL_ERROR"]
+        else:
+            os.environ["HYDRA_FULL_ERROR"] = before
 
 
 @contextmanager
