@@ -92,7 +92,7 @@ class Controller:
 
 def bins_of(space: Space) -> int | None:
     """Bins per sensor; None for an encoder of continuous readings."""
-    return space.encoder.bins if space.encoder.discrete else None  # pyright: ignore[reportAttributeAccessIssue]
+    return getattr(space.encoder, "bins", None) if space.encoder.discrete else None
 
 
 def starts(settings: Corral, name: str) -> int:

@@ -11,12 +11,10 @@ from experiments.tasks import corral
 
 
 @dataclass
-class Paper:
-    """Codes and rule of the printed algorithms."""
+class Paper(corral.Printed):
+    """The printed algorithms, read literally."""
 
     encoder: Part = part("encoder", "lookup", "the code of one reading; its bins are those of the run's encoder")
-    record: Part = part("record", "sum", "how the codes of all sensors become a condition")
-    protection: Part = part("protection", "self_shift", "what is done to a condition before it is bound")
     rule: Part = part("rule", "literal", "how a program is learned")
 
 

@@ -25,7 +25,7 @@ from rich.console import Console
 
 from experiments.kit import run as runs
 from experiments.kit.messages import in_words
-from experiments.kit.options import option_name, register_groups
+from experiments.kit.options import register_groups
 from experiments.kit.safety import refuse_code
 from experiments.kit.study import Study
 
@@ -98,10 +98,10 @@ def primary(study: Study) -> type:
     """The study's settings as Hydra's primary config: with the defaults of its groups, and where results lie."""
     logging = {"override hydra/job_logging": "stdout"}
     defaults = ["_self_", *_defaults(study.settings), {"experiment": None}, logging]
-    name = f"outputs/{study.name}/${{torchvsa.folder:${{hydra.job.override_dirname}}}}"
+    folder = "${torchvsa.folder:${hydra.job.override_dirname}}"
     hydra_block = {
-        "run": {"dir": name},
-        "sweep": {"dir": f"outputs/{study.name}/sweep", "subdir": "${torchvsa.folder:${hydra.job.override_dirname}}"},
+        "run": {"dir": f"outputs/{study.name}/{folder}"},
+        "sweep": {"dir": f"outputs/{study.name}/sweep", "subdir": folder},
         "job": {"config": {"override_dirname": {"exclude_keys": ["workers", "fresh"]}}},
         "job_logging": {"root": {"level": "WARNING"}},
         "output_subdir": None,
@@ -172,6 +172,3 @@ def ended_by_signals() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
-
-
-__all__ = ["errors_in_one_line", "option_name", "primary", "register", "run_study"]

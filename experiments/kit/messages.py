@@ -38,7 +38,7 @@ def _of_omegaconf(error: OmegaConfBaseException) -> str:
         if key == "experiment":
             return "this study has no presets, so that there is no experiment to choose"
         parent, _, name = key.rpartition(".")
-        known = [] if error.parent_node is None else [str(one) for one in error.parent_node if one != "hydra"]  # pyright: ignore[reportGeneralTypeIssues]
+        known = [] if error.parent_node is None else [str(one) for one in error.parent_node if one != "hydra"]  # pyright: ignore[reportGeneralTypeIssues] (a container)
         near = difflib.get_close_matches(name, known, 1)
         hint = f"did you mean {parent}.{near[0]}?".replace(" .", " ") if near else f"choose from {', '.join(known)}"
         return f"there is no setting {key!r}; {hint}"

@@ -90,10 +90,14 @@ def described_option(group: str, option: str) -> list[tuple[str, str, str]]:
         (schema,) = changed.pop("defaults")
         option = schema.rpartition("/")[2].partition("@")[0]
     (name,) = (name for name in found.parts if option_name(name) == option)
-    defaults = {field.name: field.default for field in dataclasses.fields(typed(name, found.parts[name], found))}
     meanings = {**MEANINGS, **found.meanings}
-    values = {**defaults, **changed}
-    return [(key, written(value), meanings.get(key, "")) for key, value in values.items() if key != "name"]
+    rows = []
+    for field in dataclasses.fields(typed(name, found.parts[name], found)):
+        if field.name != "name":
+            choices = ", ".join(map(str, field.metadata.get("choices", ())))
+            about = meanings.get(field.name, "") + (f"; one of {choices}" if choices else "")
+            rows.append((field.name, written(changed.get(field.name, field.default)), about))
+    return rows
 
 
 def register_groups() -> None:
@@ -153,7 +157,7 @@ def _kind(hint: Any) -> tuple[Any, tuple[object, ...]]:
         if len(names) != 1:
             return (Any, ()) if names else (None, ())
         kind = names.pop()
-        return (Optional[kind] if type(None) in arguments else kind), choices  # noqa: UP045
+        return (Optional[kind] if type(None) in arguments else kind), choices  # noqa: UP045 (`kind` is known at run time only)
     if isinstance(origin, type) and issubclass(origin, Mapping | Iterable):
         return Any, ()
     return None, ()

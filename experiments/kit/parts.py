@@ -51,8 +51,8 @@ def conditions(vsa: VSA, sensors: int, encoder: Options, record: Options) -> Enc
     if takes(made, "values"):
         values = _made("encoder", VALUE_ENCODERS, encoder, vsa)
         return _made("record", ENCODERS, record, values, sensors)
-    if takes(made, "bins"):
-        record = {**record, "bins": encoder.get("bins", 32)}
+    if takes(made, "bins") and "bins" in encoder:
+        record = {**record, "bins": encoder["bins"]}
     return _made("record", ENCODERS, record, vsa, sensors)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -77,7 +78,7 @@ def draw(study: Study, outcome: Outcome, console: Console) -> Page:
     study.page(page, outcome, study)
     section = page.section("How to reproduce")
     section.text("The same settings give the same numbers, times aside.")
-    section.code(" ".join(outcome.provenance["command"]))
+    section.code(shlex.join(outcome.provenance["command"]))
     versions = ", ".join(f"{name} {version}" for name, version in outcome.provenance["versions"].items())
     commit, date, host = (outcome.provenance[key] for key in ("commit", "date", "host"))
     section.text(
@@ -92,29 +93,34 @@ def draw(study: Study, outcome: Outcome, console: Console) -> Page:
 
 def finished(folder: Path, study: Study, config: dict[str, Any]) -> bool:
     """Whether a folder holds the results of a study, in this version and with these settings."""
-    path = folder / "results.json"
-    if not path.is_file():
+    if not (folder / "results.json").is_file():
         return False
-    found = json.loads(path.read_text())
-    made = (found.get("study"), found.get("version"), store.relevant(found.get("config", {})))
+    found = _results(folder)
+    made = (found["study"], found["version"], store.relevant(found["config"]))
     return made == (study.name, torchvsa.__version__, store.plain(store.relevant(config)))
 
 
 def load(folder: Path, study: Study | None = None) -> tuple[Study, Outcome]:
     """A study, by default the registered one, and what it found, from the folder of a finished run."""
+    content = _results(folder)
+    study = study or STUDIES.find(content["study"])
+    settings = settings_of(study, content["config"])
+    records = pd.read_parquet(folder / "records.parquet")
+    config, table, metrics, provenance = (content[key] for key in ("config", "table", "metrics", "provenance"))
+    return study, Outcome(folder, settings, config, records, table, metrics, provenance)
+
+
+def _results(folder: Path) -> dict[str, Any]:
+    """The content of `results.json`. Raises `ValueError`, naming the file, unless a run wrote it."""
     path = folder / "results.json"
     try:
         content = json.loads(path.read_text())
     except json.JSONDecodeError as error:
         raise ValueError(f"{path} is not JSON: {error}") from error
-    if not isinstance(content, dict) or not {"study", "config", "table", "metrics", "provenance"} <= set(content):
+    needed = {"study", "version", "config", "table", "metrics", "provenance"}
+    if not isinstance(content, dict) or not needed <= set(content):
         raise ValueError(f"{path} does not hold the results of a study")
-    study = study or STUDIES.find(content["study"])
-    settings = settings_of(study, content["config"])
-    records = pd.read_parquet(folder / "records.parquet")
-    found = (content[key] for key in ("config", "table", "metrics", "provenance"))
-    config, table, metrics, provenance = found
-    return study, Outcome(folder, settings, config, records, table, metrics, provenance)
+    return content
 
 
 def settings_of(study: Study, config: Any) -> Any:

@@ -98,13 +98,13 @@ def described(cls: type, prefix: str = "") -> Iterator[Described]:
         elif "group" in metadata:
             yield Described(name, str(metadata["option"]), metadata["about"], f"an option of {metadata['group']}")
         else:
-            default = field.default if field.default is not dataclasses.MISSING else field.default_factory()  # pyright: ignore[reportCallIssue]
+            default = field.default if field.default is not dataclasses.MISSING else field.default_factory()  # pyright: ignore[reportCallIssue] (one of the two is there)
             yield Described(name, written(default), metadata["about"], _allowed(metadata["allowed"]))
 
 
 def check(given: object, prefix: str = "") -> None:
     """Raise `ValueError`, naming the setting, its value and what is allowed, unless all settings are allowed."""
-    for field in dataclasses.fields(given):  # pyright: ignore[reportArgumentType]
+    for field in dataclasses.fields(given):  # pyright: ignore[reportArgumentType] (a dataclass)
         name, value, metadata = prefix + field.name, getattr(given, field.name), field.metadata
         if "settings" in metadata:
             check(value, f"{name}.")

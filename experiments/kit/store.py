@@ -22,8 +22,7 @@ import torch
 import torchvsa
 from behaviours.storage import write_atomically
 from experiments.kit.settings import NO_MATTER
-
-Row = dict[str, Any]
+from experiments.kit.study import Row
 
 LIBRARIES = ("torch", "numpy", "scipy", "scikit-learn", "pybullet", "pandas")
 

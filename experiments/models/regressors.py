@@ -48,7 +48,7 @@ class Levels:
         self.model.fit(X, labels.ravel())
         return self
 
-    def predict(self, X: Floats) -> Floats:  # noqa: N803
+    def predict(self, X: Floats) -> Floats:  # noqa: N803 (scikit-learn's name)
         """Commands `[B, m]`, each row one of the results that were shown."""
         return self.results[self.model.predict(X)]
 

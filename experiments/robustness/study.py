@@ -23,7 +23,7 @@ from rich.progress import Progress
 import sim
 import torchvsa
 from behaviours import Demonstrations, Space
-from experiments.kit import Cell, Part, Row, Study, grid, part, parts, setting, settings
+from experiments.kit import Cell, Row, Study, grid, parts, setting, settings
 from experiments.models import hand_written
 from experiments.robustness import page
 from experiments.robustness.baselines import Network, Tree
@@ -37,20 +37,12 @@ TEACHER = "teacher"
 
 
 @dataclass
-class Printed:
-    """The paper's codes, and its rule with a raw accumulator."""
-
-    encoder: Part = part("encoder", "lookup", "the code of one reading")
-    record: Part = part("record", "sum", "how the codes of all sensors become a condition")
-    protection: Part = part("protection", "self_shift", "what is done to a condition before it is bound")
-    rule: Part = part("rule", "one_shot", "how the program is learned")
-
-
-@dataclass
 class Robustness(corral.Learning):
     """The settings of this study; those of `Learning` are the learner `default`."""
 
-    one_shot: Printed = settings(Printed, "the learner `one_shot`: the paper's codes, of the same architecture")
+    one_shot: corral.Printed = settings(
+        corral.Printed, "the learner `one_shot`: the paper's codes, of the same architecture"
+    )
     learners: list[str] = setting(
         ["default", "one_shot", "hand_written", "mlp", "decision_tree"], "rows, in this order",
         choices=lambda: LEARNERS, distinct=True,
@@ -91,13 +83,13 @@ def check(settings: Robustness) -> None:
         LEARNERS["hand_written"].learn(settings, None)
 
 
-def space_of(settings: Robustness, options: Robustness | Printed) -> Space:
+def space_of(settings: Robustness, options: Robustness | corral.Printed) -> Space:
     """The codebooks of `default` or `one_shot`."""
     vsa, protection = settings.vsa, options.protection
     return parts.space(corral.schema(), vsa, options.encoder, options.record, protection, settings.seed)
 
 
-def _program(settings: Robustness, options: Robustness | Printed, train: Demonstrations) -> Learner:
+def _program(settings: Robustness, options: Robustness | corral.Printed, train: Demonstrations) -> Learner:
     return Program(parts.rule(options.rule).fit(space_of(settings, options), train))
 
 

@@ -64,6 +64,16 @@ class Learning(Driving):
     arena: Part = part("arena", "default", "the corral")
 
 
+@dataclass
+class Printed:
+    """The paper's codes, and its rule with a raw accumulator."""
+
+    encoder: Part = part("encoder", "lookup", "the code of one reading")
+    record: Part = part("record", "sum", "how the codes of all sensors become a condition")
+    protection: Part = part("protection", "self_shift", "what is done to a condition before it is bound")
+    rule: Part = part("rule", "one_shot", "how a program is learned")
+
+
 def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
     """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
     return Schema(
@@ -75,13 +85,10 @@ def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
     )
 
 
-def space(settings: Any, vsa: parts.Options | None = None, bins: int | None = None) -> Space:
-    """Codebooks for the groups `encoder`, `record` and `protection` of these settings.
-
-    `vsa` is needed where they do not choose one; `bins` replaces those of the encoder.
-    """
+def space(settings: Learning, bins: int | None = None) -> Space:
+    """Codebooks for the groups `vsa`, `encoder`, `record` and `protection`; `bins` replaces those of the encoder."""
     encoder = settings.encoder if bins is None else {**settings.encoder, "bins": bins}
-    return parts.space(schema(), vsa or settings.vsa, encoder, settings.record, settings.protection, settings.seed)
+    return parts.space(schema(), settings.vsa, encoder, settings.record, settings.protection, settings.seed)
 
 
 def arena(options: parts.Options) -> sim.Arena:
@@ -142,7 +149,7 @@ def shown_in(rollout: sim.Rollout) -> tuple[Demonstrations, NDArray[np.bool_]]:
 def moving(rollout: sim.Rollout) -> Demonstrations:
     """The control steps before the lamp: a robot at rest repeats one condition and would flatter every learner."""
     shown, before = shown_in(rollout)
-    return shown.where(before.tolist())
+    return shown.where(before)
 
 
 def from_file(path: str | Path) -> Demonstrations:

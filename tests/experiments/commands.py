@@ -6,6 +6,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from experiments.main import main
+
 SMALL = ("demonstrations=6", "starts=6", "other_starts=4", "wheeled_starts=2", "validation_starts=2", "seconds=20")
 """A job of seconds instead of minutes; what it shows is not meant to be good."""
 
@@ -22,6 +24,13 @@ def only(folder: Path, name: str) -> Path:
     """The one file of that name below a folder."""
     (path,) = folder.rglob(name)
     return path
+
+
+def drawn_again(page: Path) -> str:
+    """The text of a run's page after `torchvsa draw`, which writes it anew."""
+    page.unlink()
+    main(["draw", str(page.parent)])
+    return page.read_text()
 
 
 def results(folder: Path) -> dict[str, Any]:

@@ -2,35 +2,15 @@
 
 import base64
 import io
-from html.parser import HTMLParser
 
 import pytest
+from elements import Elements
 from PIL import Image
 
 from experiments.kit import Column, Page, Table
 
 HOSTILE = """</title><script>alert("1")</script><img src='https://a.org/x' onerror="alert(2)"> & `<b>{{ 7 * 7 }}`"""
 TINY = Image.new("RGB", (3, 2), "red")
-
-
-class Elements(HTMLParser):
-    """Tags with their attributes, and the visible text."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
-    def links(self) -> list[str]:
-        """Everything that the page refers to."""
-        return [value or "" for _, attrs in self.tags for key, value in attrs.items() if key in ("src", "href")]
 
 
 def png() -> bytes:

@@ -3,36 +3,16 @@
 import base64
 import io
 import shutil
-from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+from elements import Elements
 from PIL import Image
 from rich.console import Console
 from small_run import full_run, small_run
 
 from experiments.corral import tables, text
 from experiments.kit.run import draw, load
-
-
-class Elements(HTMLParser):
-    """Tags with their attributes, and the visible text."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.tags: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append((tag, dict(attrs)))
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
-    def links(self) -> list[str]:
-        """Everything that the page refers to."""
-        return [value or "" for _, attrs in self.tags for key, value in attrs.items() if key in ("src", "href")]
 
 
 def embedded(html: str) -> list[bytes]:

@@ -8,14 +8,13 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 import torch
-from commands import only, output_of, results
+from commands import drawn_again, only, output_of, results
 from kits import composed
 from rich.console import Console
 
 from behaviours.data import load_wall_following
 from experiments.generalisation.wall_following import WallFollowing, cells, measure, study
 from experiments.kit.run import check_all, load, run
-from experiments.main import main
 from experiments.models.torchhd import TorchHD, installed
 from experiments.tasks.wall_following import blocks, stratified, wall_commands
 
@@ -137,9 +136,7 @@ def test_the_command_writes_table_records_and_page(tmp_path: Path) -> None:
     page = only(tmp_path, "report.html")
     before = page.read_text()
     assert before.count("data:image/png;base64,") == 1
-    page.unlink()
-    main(["draw", str(page.parent)])
-    assert page.read_text() == before
+    assert drawn_again(page) == before
     assert load(page.parent)[1].table == content["table"]
 
 
