@@ -1,15 +1,19 @@
-"""The corral-escape task: a simulated robot with sensors, a teacher, and rollouts of any controller."""
+"""The corral-escape task: a simulated robot with sensors, teachers, and rollouts of any controller."""
 
+from sim.arena import Arena, Start, draw_start, walls
+from sim.arenas import ARENAS, find_arena
+from sim.arenas.corral import corral
 from sim.channel import Channel
 from sim.controller import Controller, ControllerLike, as_controller, replay
-from sim.corral import ARENAS, Arena, Start, draw_start
+from sim.engines import NAMES as ENGINES
 from sim.env import CorralEscapeEnv, CorralEscapeVectorEnv, register
 from sim.result import Rollout, Steps, Summary
 from sim.robot import ACTUATORS, BODIES, CONTROL_HZ
 from sim.rollout import rollout
-from sim.sensors import SENSORS
+from sim.shapes import Box, Lamp, Pillar
 from sim.statistics import wilson
-from sim.teacher import BEHAVIOURS, TEACHER_RULES, Teacher
+from sim.task import SENSORS, Task
+from sim.teachers import BEHAVIOURS, TEACHER_RULES, FleeLight, InOrder, Teacher, WallFollowing
 
 __all__ = [
     "ACTUATORS",
@@ -17,23 +21,34 @@ __all__ = [
     "BEHAVIOURS",
     "BODIES",
     "CONTROL_HZ",
+    "ENGINES",
     "SENSORS",
     "TEACHER_RULES",
     "Arena",
+    "Box",
     "Channel",
     "Controller",
     "ControllerLike",
     "CorralEscapeEnv",
     "CorralEscapeVectorEnv",
+    "FleeLight",
+    "InOrder",
+    "Lamp",
+    "Pillar",
     "Rollout",
     "Start",
     "Steps",
     "Summary",
+    "Task",
     "Teacher",
+    "WallFollowing",
     "as_controller",
+    "corral",
     "draw_start",
+    "find_arena",
     "replay",
     "rollout",
+    "walls",
     "wilson",
 ]
 

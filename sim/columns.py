@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.engine import Flags, Floats, Integers, State
 from sim.robot import ACTUATORS, CONTROL_HZ
-from sim.sensors import SENSORS
+from sim.task import Task
 from sim.tracker import Tracker
-from sim.vector_sim import State
 
 
 class EpisodeColumns:
     """Columns with one row per episode, filled when an episode ends."""
 
-    def __init__(self, numbers: NDArray[np.int64]) -> None:
+    def __init__(self, numbers: Integers) -> None:
         size = len(numbers)
         self.episode = numbers
         self.success = np.zeros(size, dtype=np.bool_)
@@ -28,25 +28,19 @@ class EpisodeColumns:
         self._at_lamp = np.zeros(size, dtype=np.int64)
         self._reached = np.zeros(size, dtype=np.int64)
 
-    def count(
-        self,
-        rows: NDArray[np.int64],
-        contact: NDArray[np.bool_],
-        at_lamp: NDArray[np.bool_],
-        reached: NDArray[np.bool_],
-    ) -> None:
-        """Count one control step of the episodes in these rows."""
+    def count(self, rows: Integers, contact: Flags, at_lamp: Flags, reached: Flags) -> None:
+        """Count one control step of the episodes in these rows; `at_lamp` and `reached` are of the last goal."""
         self._contacts[rows] += contact
         self._at_lamp[rows] += at_lamp
         self._reached[rows] += reached
 
-    def finish(self, row: int, tracker: Tracker, slot: int) -> None:
-        """Fill the row of the episode that ended in `slot`."""
-        self.success[row] = tracker.success[slot]
-        self.escaped[row] = tracker.escaped[slot]
-        self.steps[row] = tracker.clock[slot]
-        if tracker.first[slot] >= 0:
-            self.time_to_light[row] = tracker.first[slot] / CONTROL_HZ
+    def finish(self, rows: Integers, tracker: Tracker, slots: Integers) -> None:
+        """Fill the rows of the episodes that ended in `slots`."""
+        self.success[rows] = tracker.success[slots]
+        self.escaped[rows] = tracker.escaped[slots]
+        self.steps[rows] = tracker.clock[slots]
+        first = tracker.first[slots]
+        self.time_to_light[rows] = np.where(first >= 0, first / CONTROL_HZ, np.nan)
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """The columns, named like the fields of `Rollout`."""
@@ -65,43 +59,43 @@ class EpisodeColumns:
 
 
 class StepColumns:
-    """Columns with one row per control step."""
+    """Columns with one row per control step, named like the fields of `Steps`."""
 
-    def __init__(self, record: bool) -> None:
-        self._record = record
+    _NAMES = ("step", "x", "y", "heading", "sensors", "commands", "contact", "at_lamp", "reached", "goal")
+
+    def __init__(self, task: Task) -> None:
         self._steps: list[tuple[NDArray[Any], ...]] = []
+        self._widths = {"sensors": len(task.sensors), "commands": len(ACTUATORS)}
 
     def add(
-        self,
-        rows: NDArray[np.int64],
-        step: NDArray[np.int64],
-        state: State,
-        driven: NDArray[np.bool_],
-        commands: NDArray[np.float64],
-        reached: NDArray[np.bool_],
+        self, rows: Integers, state: State, driven: Flags, commands: Floats, tracker: Tracker, slots: Integers
     ) -> None:
         """Add one control step of the episodes in these rows.
 
         Args:
             rows: Rows of the episodes in `EpisodeColumns`.
-            step: Index of the control step within each episode.
             state: State of the robots when the command was given.
             driven: Mask of the robots in `state` that these episodes belong to.
             commands: Their commands.
-            reached: Whether each of them has touched the lamp by now.
+            tracker: What they have reached by now.
+            slots: Their slots there.
         """
-        if self._record:
-            poses = tuple(column[driven] for column in (state.x, state.y, state.heading, state.sensors))
-            flags = tuple(column[driven] for column in (state.contact, state.at_lamp))
-            self._steps.append((rows, step, *poses, commands.copy(), *flags, reached))
+        poses = tuple(column[driven] for column in (state.x, state.y, state.heading, state.sensors))
+        reached = tracker.at_goal[slots], tracker.first[slots] >= 0, tracker.goal[slots]
+        self._steps.append((rows, tracker.clock[slots], *poses, commands.copy(), state.contact[driven], *reached))
 
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """The columns, named like the fields of `Steps` with the prefix `row_`, sorted by episode and step."""
-        names = ("step", "x", "y", "heading", "sensors", "commands", "contact", "at_lamp", "reached")
+    def columns(self, steps: Integers) -> dict[str, NDArray[Any]]:
+        """The columns, sorted by episode and step, of episodes with this many `steps`; empty if none was added."""
+        kinds: dict[str, Any] = {"step": np.int64, "goal": np.int64}
+        kinds |= dict.fromkeys(("contact", "at_lamp", "reached"), np.bool_)
         if not self._steps:
-            shapes = {"sensors": (0, len(SENSORS)), "commands": (0, len(ACTUATORS))}
-            kinds: dict[str, Any] = {"step": np.int64} | dict.fromkeys(names[-3:], np.bool_)
-            return {f"row_{name}": np.zeros(shapes.get(name, 0), kinds.get(name, np.float64)) for name in names}
+            shapes = {name: (0, width) for name, width in self._widths.items()}
+            return {name: np.zeros(shapes.get(name, 0), kinds.get(name, np.float64)) for name in self._NAMES}
         rows, *columns = (np.concatenate(column) for column in zip(*self._steps, strict=True))
-        order = np.lexsort((columns[0], rows))
-        return {f"row_{name}": column[order] for name, column in zip(names, columns, strict=True)}
+        first = np.cumsum(steps) - steps
+        place = first[rows] + columns[0]
+        sorted_columns = {}
+        for name, column in zip(self._NAMES, columns, strict=True):
+            sorted_columns[name] = np.empty_like(column)
+            sorted_columns[name][place] = column
+        return sorted_columns

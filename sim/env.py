@@ -11,14 +11,15 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.camera import render_rgb
+from sim.arena import Arena
+from sim.arenas import find_arena
 from sim.channel import Channel
 from sim.checks import whole_number
-from sim.corral import Arena
+from sim.engine import State, check_commands, control_steps
+from sim.engines import find_engine
 from sim.robot import ACTUATORS, CONTROL_HZ
-from sim.sensors import SENSORS
+from sim.task import Task
 from sim.tracker import DWELL_SECONDS, Tracker
-from sim.vector_sim import State, VectorSim, check_commands, control_steps
 
 MAX_STEPS = 60 * CONTROL_HZ
 """Gymnasium truncates an episode after this many control steps (60 s)."""
@@ -40,39 +41,44 @@ def _check_render_mode(render_mode: str | None) -> None:
 class _EnvState:
     """The state that both environments share: the robots, their episodes, and the progress of each."""
 
-    def __init__(self, size: int, arena: str | Arena, body: str, dwell: float) -> None:
-        self.tracker = Tracker(size, control_steps(dwell))
-        self.simulator = VectorSim(size, arena, body)
+    def __init__(
+        self, size: int, arena: str | Arena, body: str | None, dwell: float, engine: str, task: Task | None
+    ) -> None:
+        arena = find_arena(arena)
+        self.task = Task.of(arena) if task is None else task
+        self.task.check(arena)
+        self.slots = np.arange(size)
+        self.tracker = Tracker(size, control_steps(dwell), len(self.task.goals))
+        self.engine = find_engine(engine)(size, arena, self.task, body)
         self.episodes = np.zeros(size, dtype=np.int64)
 
-    def reset(self, slot: int, episode: int) -> None:
-        self.simulator.reset(slot, episode)
-        self.tracker.reset(slot)
-        self.episodes[slot] = episode
+    def reset(self, slots: NDArray[np.int64], episodes: NDArray[np.int64]) -> None:
+        self.engine.reset(slots, episodes)
+        self.tracker.reset(slots)
+        self.episodes[slots] = episodes
 
     def check_open(self) -> None:
-        """Raise if the physics clients are disconnected."""
-        if self.simulator.closed:
+        """Raise if the engine is closed."""
+        if self.engine.closed:
             raise gymnasium.error.ClosedEnvironmentError("the environment is closed; make a new one")
 
     def observe(self) -> State:
-        slots = range(len(self.episodes))
-        state = self.simulator.observe(slots)
-        self.tracker.observe(np.arange(len(self.episodes)), state)
+        state = self.engine.observe(self.slots)
+        self.tracker.observe(self.slots, state)
         return state
 
-    def drive(self, slots: list[int], action: object) -> None:
+    def drive(self, slots: NDArray[np.int64], action: object) -> None:
         commands = check_commands(action, len(slots))
         if not np.isfinite(commands).all():
             raise ValueError(f"action {commands.tolist()}; expected finite commands in [-1, 1]")
-        self.simulator.drive(slots, commands)
+        self.engine.drive(slots, commands)
 
     def info(self, state: State) -> dict[str, NDArray[Any]]:
         return {
             "episode": self.episodes.copy(),
             "pose": np.stack([state.x, state.y, state.heading], axis=1),
             "contact": state.contact,
-            "at_lamp": state.at_lamp,
+            "at_lamp": self.tracker.at_goal.copy(),
             "escaped": self.tracker.escaped.copy(),
             "success": self.tracker.success.copy(),
         }
@@ -122,17 +128,19 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     Terminated: the robot touched the lamp in every state of the dwell time. Truncated: after 1,200 control steps
     (60 s), by Gymnasium's time limit.
 
-    `info` holds `episode`, `pose` (x, y in m, heading in rad), `contact` (with a wall), `at_lamp`, `escaped` (was
-    outside the corral) and `success`.
+    `info` holds `episode`, `pose` (x, y in m, heading in rad), `contact` (with an obstacle), `at_lamp` (of its goal),
+    `escaped` (was outside the corral) and `success`.
 
     ## Arguments
 
     | argument      | default     | meaning                                                            |
     |---------------|-------------|--------------------------------------------------------------------|
     | `arena`       | `"default"` | a name in `sim.ARENAS`, or an `Arena`                              |
-    | `body`        | `"planar"`  | a name in `sim.BODIES`: `planar` is fast, `wheeled` stands on wheels |
+    | `body`        | None        | `planar`; `wheeled` stands on wheels, in `bullet` only             |
     | `dwell`       | 2.0         | seconds at the lamp that make a success                            |
-    | `render_mode` | None        | `"rgb_array"`: a picture `[H, W, 3]` uint8, without a display      |
+    | `render_mode` | None        | `"rgb_array"`: a picture `[H, W, 3]` uint8, drawn by pybullet      |
+    | `engine`      | `"vector"`  | a name in `sim.ENGINES`                                            |
+    | `task`        | None        | sensors and goals, by default `Task.of(arena)`                     |
 
     ## Versions
 
@@ -144,15 +152,17 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
     def __init__(
         self,
         arena: str | Arena = "default",
-        body: str = "planar",
+        body: str | None = None,
         dwell: float = DWELL_SECONDS,
         render_mode: str | None = None,
+        engine: str = "vector",
+        task: Task | None = None,
     ) -> None:
         _check_render_mode(render_mode)
         self.render_mode = render_mode
-        self.observation_space = _box(SENSORS)
+        self._state = _EnvState(1, arena, body, dwell, engine, task)
+        self.observation_space = _box(self._state.task.sensors)
         self.action_space = _box(ACTUATORS)
-        self._state = _EnvState(1, arena, body, dwell)
         self._episode: int | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
@@ -169,10 +179,10 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         super().reset(seed=seed)
         before = self._episode
         if seed is not None or before is None:
-            self._state.simulator.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+            self._state.engine.seed = int(self.np_random.integers(2**31)) if seed is None else seed
             before = -1
         self._episode = before + 1 if requested is None else requested
-        self._state.reset(0, self._episode)
+        self._state.reset(self._state.slots, np.array([self._episode]))
         state = self._state.observe()
         return state.sensors[0], self._info(state)
 
@@ -181,7 +191,7 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         self._state.check_open()
         if self._episode is None:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
-        self._state.drive([0], [action])
+        self._state.drive(self._state.slots, [action])
         state = self._state.observe()
         success = bool(self._state.tracker.success[0])
         return state.sensors[0], float(success), success, False, self._info(state)
@@ -191,11 +201,11 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         if self.render_mode is None:
             return None
         self._state.check_open()
-        return render_rgb(self._state.simulator.worlds[0].client, self._state.simulator.arena)
+        return self._state.engine.picture(0)
 
     def close(self) -> None:
-        """Disconnect the physics client. A second call does nothing."""
-        self._state.simulator.close()
+        """Free the engine. A second call does nothing."""
+        self._state.engine.close()
 
     def _info(self, state: State) -> dict[str, Any]:
         return {
@@ -223,21 +233,23 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         num_envs: int = 1,
         max_episode_steps: int = MAX_STEPS,
         arena: str | Arena = "default",
-        body: str = "planar",
+        body: str | None = None,
         dwell: float = DWELL_SECONDS,
         render_mode: str | None = None,
+        engine: str = "vector",
+        task: Task | None = None,
     ) -> None:
         _check_render_mode(render_mode)
         num_envs = whole_number("num_envs", num_envs, 1)
         max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
         self.num_envs = num_envs
         self.render_mode = render_mode
-        self.single_observation_space = _box(SENSORS)
+        self._state = _EnvState(num_envs, arena, body, dwell, engine, task)
+        self.single_observation_space = _box(self._state.task.sensors)
         self.single_action_space = _box(ACTUATORS)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._max_episode_steps = max_episode_steps
-        self._state = _EnvState(num_envs, arena, body, dwell)
         self._over = np.zeros(num_envs, dtype=np.bool_)
         self._ready = False
 
@@ -248,9 +260,8 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
             raise ValueError(f"unknown reset options {sorted(map(str, options))}; the vector environment takes none")
         seed = None if seed is None else whole_number("seed", seed)
         super().reset(seed=seed)
-        self._state.simulator.seed = int(self.np_random.integers(2**31)) if seed is None else seed
-        for slot in range(self.num_envs):
-            self._state.reset(slot, slot)
+        self._state.engine.seed = int(self.np_random.integers(2**31)) if seed is None else seed
+        self._state.reset(self._state.slots, self._state.slots)
         self._over[:] = False
         self._ready = True
         state = self._state.observe()
@@ -262,11 +273,11 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         if not self._ready:
             raise gymnasium.error.ResetNeeded("call reset() before step()")
         commands = check_commands(actions, self.num_envs)
-        driven = np.flatnonzero(~self._over).tolist()
-        if driven:
+        driven, over = np.flatnonzero(~self._over), np.flatnonzero(self._over)
+        if driven.size:
             self._state.drive(driven, commands[driven])
-        for slot in np.flatnonzero(self._over).tolist():
-            self._state.reset(slot, int(self._state.episodes[slot]) + self.num_envs)
+        if over.size:
+            self._state.reset(over, self._state.episodes[over] + self.num_envs)
         state = self._state.observe()
         terminated = self._state.tracker.success.copy()
         truncated = ~terminated & (self._state.tracker.clock >= self._max_episode_steps)
@@ -278,11 +289,11 @@ class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]])
         if self.render_mode is None:
             return None
         self._state.check_open()
-        return tuple(render_rgb(world.client, self._state.simulator.arena) for world in self._state.simulator.worlds)
+        return tuple(self._state.engine.picture(slot) for slot in range(self.num_envs))
 
     def close_extras(self, **_: Any) -> None:
-        """Disconnect the physics clients."""
-        self._state.simulator.close()
+        """Free the engine."""
+        self._state.engine.close()
 
 
 def register() -> None:

@@ -13,6 +13,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import matplotlib
+import matplotlib.colors
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
@@ -20,23 +21,32 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
 from PIL import Image, ImageDraw, ImageFont
 
-from sim.corral import Arena
+from sim.arena import Arena
 from sim.result import Rollout, Steps
 from sim.robot import CONTROL_HZ, RADIUS
 from sim.sensors import DISTANCE_MAX, LIGHT_MAX
-from sim.teacher import BEHAVIOURS, Teacher
+from sim.shapes import Box
+from sim.teachers import BEHAVIOURS, InOrder
 
-WALL, LAMP, INK, PAPER = "#3d4654", "#f5b400", "#22272f", "#ffffff"
+WALL, INK, PAPER = "#3d4654", "#22272f", "#ffffff"
+LAMPS = {"yellow": "#f5b400", "blue": "#2f6fd0", "red": "#d03a3a"}
+"""Lamps by their colour; others are white."""
 COLOURS = {"seek_light": "#e07b00", "avoid": "#c8324b", "cruise": "#3f74b5"}
 """The colour of each of the teacher's behaviours."""
 
 
 def draw_corral(ax: Axes, arena: Arena) -> None:
     """Draw walls and lamp from above into `ax`, in m, with equal scales and without a frame."""
-    for x, y, half_x, half_y in arena.walls.tolist():
-        ax.add_patch(Rectangle((x - half_x, y - half_y), 2 * half_x, 2 * half_y, color=WALL, lw=0, zorder=2))
-    for scale, alpha in ((3.2, 0.10), (2.2, 0.16), (1.5, 0.25), (1.0, 1.0)):
-        ax.add_patch(Circle(arena.lamp, scale * arena.lamp_radius, color=LAMP, alpha=alpha, lw=0, zorder=1))
+    for shape in arena.obstacles:
+        if isinstance(shape, Box):
+            corner, width, height = (shape.x - shape.half_x, shape.y - shape.half_y), 2 * shape.half_x, 2 * shape.half_y
+            ax.add_patch(Rectangle(corner, width, height, color=WALL, lw=0, zorder=2))
+        else:
+            ax.add_patch(Circle((shape.x, shape.y), shape.radius, color=WALL, lw=0, zorder=2))
+    for lamp in arena.lamps:
+        for scale, alpha in ((3.2, 0.10), (2.2, 0.16), (1.5, 0.25), (1.0, 1.0)):
+            colour, radius = LAMPS.get(lamp.colour, PAPER), scale * lamp.radius
+            ax.add_patch(Circle((lamp.x, lamp.y), radius, color=colour, alpha=alpha, lw=0, zorder=1))
     left, right, bottom, top = _extent(arena)
     ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xticks=[], yticks=[])
     ax.set_axis_off()
@@ -61,10 +71,11 @@ def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = No
         path = rollout.slice(episode)
         points = np.stack([path.x, path.y], axis=1)
         pieces = np.stack([points[:-1], points[1:]], axis=1)
-        colours = [_COLOUR_OF_RULE[rule] for rule in Teacher().rule(path.sensors[:-1]).tolist()]
+        rules = InOrder(rollout.task).rule(path.sensors, path.goal)
+        colours = [_COLOUR_OF_RULE[rule] for rule in rules[:-1].tolist()]
         ax.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.1, alpha=0.75, zorder=3))
         # A robot that avoids an obstacle turns on the spot, which a line does not show.
-        turns = points[Teacher().rule(path.sensors) == _AVOID]
+        turns = points[rules == _AVOID]
         ax.scatter(turns[:, 0], turns[:, 1], s=9, color=COLOURS["avoid"], lw=0, zorder=4)
         ax.plot(*points[0], "o", ms=5, mfc=PAPER, mec=INK, mew=1.2, zorder=5)
         if not rollout.success[rollout.episode == episode][0]:
@@ -113,9 +124,7 @@ def animate(
     if speed <= 0 or frames < 1:
         raise ValueError(f"speed={speed}, frames={frames}; expected a speed above 0 and at least 1 frame")
     chosen = _typical(rollouts) if episode is None else episode
-    panels = [
-        _Panel(rollout.slice(chosen), title, rollout.arena) for rollout, title in zip(rollouts, titles, strict=True)
-    ]
+    panels = [_Panel(rollout.slice(chosen), title, rollout) for rollout, title in zip(rollouts, titles, strict=True)]
     length = max(len(panel) for panel in panels)
     # Two control steps per frame look smooth. Viewers slow down a GIF with less than 20 ms per frame.
     stride = max(2, -(-length // frames), math.ceil(speed * 0.02 * CONTROL_HZ))
@@ -149,9 +158,15 @@ def _typical(rollouts: Sequence[Rollout]) -> int:
 
 
 def _extent(arena: Arena) -> tuple[float, float, float, float]:
-    margin, half, (lamp_x, lamp_y) = 0.2, arena.side / 2 + arena.wall_thickness, arena.lamp
-    glow = 2.2 * arena.lamp_radius
-    return -half - margin, lamp_x + glow + margin, min(-half, lamp_y - glow) - margin, max(half, lamp_y + glow) + margin
+    """What a picture shows: everything, with room for the lamps' light."""
+    left, right, bottom, top = arena.extent()
+    room = [
+        (lamp.x + side * 2.2 * lamp.radius, lamp.y + side * 2.2 * lamp.radius)
+        for lamp in arena.lamps
+        for side in (-1, 1)
+    ]
+    x, y = zip(*room, strict=True)
+    return min(left, *x) - 0.2, max(right, *x) + 0.2, min(bottom, *y) - 0.2, max(top, *y) + 0.2
 
 
 _COLOUR_OF_RULE = {rule: COLOURS[name] for name, rules in BEHAVIOURS.items() for rule in rules}
@@ -164,10 +179,12 @@ class _Panel:
 
     _WIDTH, _FINE, _HEAD, _FOOT = 400, 2, 34, 24
 
-    def __init__(self, path: Steps, title: str, arena: Arena) -> None:
-        self._path = path
+    def __init__(self, path: Steps, title: str, rollout: Rollout) -> None:
+        self._path, arena = path, rollout.arena
         self._title = title
-        self._rules = Teacher().rule(path.sensors).tolist()
+        teacher = InOrder(rollout.task)
+        self._rules = teacher.rule(path.sensors, path.goal).tolist()
+        self._lights = [rollout.task.pair(rollout.task.goals[goal]) for goal in path.goal.tolist()]
         left, right, bottom, top = _extent(arena)
         self._scale = self._WIDTH * self._FINE / (right - left)
         self._origin = left, top
@@ -175,10 +192,18 @@ class _Panel:
         self._trail = Image.new("RGB", size, PAPER)
         self._drawn = 0
         pen = ImageDraw.Draw(self._trail)
-        for scale, colour in ((3.2, "#fef8e5"), (2.3, "#fdeebf"), (1.6, "#fbdf8a"), (1.0, LAMP)):
-            self._disc(pen, *arena.lamp, scale * arena.lamp_radius, fill=colour)
-        for x, y, half_x, half_y in arena.walls.tolist():
-            pen.rectangle([self._at(x - half_x, y + half_y), self._at(x + half_x, y - half_y)], fill=WALL)
+        for lamp in arena.lamps:
+            for scale, share in ((3.2, 0.1), (2.3, 0.25), (1.6, 0.5), (1.0, 1.0)):
+                light = LAMPS.get(lamp.colour, PAPER)
+                self._disc(pen, lamp.x, lamp.y, scale * lamp.radius, fill=_mixed(light, share))
+        for shape in arena.obstacles:
+            if isinstance(shape, Box):
+                (left, right), (low, high) = (
+                    (at - half, at + half) for at, half in ((shape.x, shape.half_x), (shape.y, shape.half_y))
+                )
+                pen.rectangle([self._at(left, high), self._at(right, low)], fill=WALL)
+            else:
+                self._disc(pen, shape.x, shape.y, shape.radius, fill=WALL)
         self._disc(pen, float(path.x[0]), float(path.y[0]), 0.05, fill=PAPER, outline=INK, width=2 * self._FINE)
 
     def __len__(self) -> int:
@@ -210,7 +235,8 @@ class _Panel:
 
     def _robot(self, pen: ImageDraw.ImageDraw, tick: int) -> None:
         x, y, heading = (float(column[tick]) for column in (self._path.x, self._path.y, self._path.heading))
-        left, right, distance = self._path.sensors[tick].tolist()
+        readings = self._path.sensors[tick].tolist()
+        (left, right), distance = (readings[column] for column in self._lights[tick]), readings[-1]
         ahead = np.array([np.cos(heading), np.sin(heading)])
         aside = np.array([-ahead[1], ahead[0]])
         here = np.array([x, y])
@@ -231,6 +257,12 @@ class _Panel:
     def _disc(self, pen: ImageDraw.ImageDraw, x: float, y: float, radius: float, **style: object) -> None:
         (u, v), r = self._at(x, y), radius * self._scale
         pen.ellipse([u - r, v - r, u + r, v + r], **style)  # pyright: ignore[reportArgumentType]
+
+
+def _mixed(colour: str, share: float) -> tuple[int, int, int]:
+    """A colour mixed with white."""
+    red, green, blue = (round(255 + share * (255 * channel - 255)) for channel in matplotlib.colors.to_rgb(colour))
+    return red, green, blue
 
 
 def _join(frames: Sequence[Image.Image], speed: float) -> Image.Image:

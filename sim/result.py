@@ -7,9 +7,10 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.corral import Arena
+from sim.arena import Arena
 from sim.robot import CONTROL_HZ
 from sim.statistics import censored_median, wilson
+from sim.task import Task
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -23,11 +24,12 @@ class Steps:
     Attributes:
         step: `[N]`, index within the episode, from 0.
         x, y: `[N]`, m; heading: `[N]`, rad.
-        sensors: `[N, 3]`, see `sim.sensors.SENSORS`.
+        sensors: `[N, n]`, see `Task.sensors`.
         commands: `[N, 2]`, before clipping and wheel noise.
-        contact: `[N]`, whether the robot touches a wall.
-        at_lamp: `[N]`, whether it touches the lamp.
-        reached: `[N]`, whether it touches the lamp or did earlier in the episode.
+        contact: `[N]`, whether the robot touches an obstacle.
+        at_lamp: `[N]`, whether it touches the lamp that is its goal.
+        reached: `[N]`, whether it touches the lamp of its last goal or did earlier in the episode.
+        goal: `[N]`, the index of its goal in `Task.goals`.
     """
 
     step: Integers
@@ -39,6 +41,7 @@ class Steps:
     contact: Flags
     at_lamp: Flags
     reached: Flags
+    goal: Integers
 
     def __len__(self) -> int:
         return len(self.step)
@@ -56,9 +59,9 @@ class Summary:
         episodes: number of episodes.
         success_rate: with its Wilson 95 % interval `success_low`, `success_high`.
         escape_rate: fraction of the episodes in which the robot left the corral.
-        time_to_light_s: median time to the first touch of the lamp, failures censored; None if the median is censored.
+        time_to_light_s: median time to the first touch of the (last) lamp, failures censored; None if the median is.
         dwell_fraction: fraction of the control steps at the lamp since first reaching it; None if no robot did.
-        collision_fraction: fraction of all control steps in contact with a wall.
+        collision_fraction: fraction of all control steps in contact with an obstacle.
     """
 
     episodes: int
@@ -76,20 +79,22 @@ class Rollout:
     """Episodes of one controller in one arena.
 
     Attributes:
-        arena, body, seed, seconds, dwell_seconds: the arguments of `rollout`.
+        arena, task, engine, body, seed, seconds, dwell_seconds: the arguments of `rollout`.
         episode: `[E]`, the numbers of the episodes.
         success: `[E]`, whether the robot stayed at the lamp for the dwell time, which ends the episode early.
         escaped: `[E]`, whether it left the corral at any time.
-        time_to_light: `[E]`, time to the first touch of the lamp in s, NaN if there was none.
+        time_to_light: `[E]`, time to the first touch of the (last) lamp in s, NaN if there was none.
         steps: `[E]`, number of control steps.
         dwell: `[E]`, fraction of the control steps at the lamp since first reaching it, NaN if it never did.
-        collisions: `[E]`, fraction of the control steps in contact with a wall.
+        collisions: `[E]`, fraction of the control steps in contact with an obstacle.
         start: `[E, 3]`, x, y, heading.
         trajectory: the control steps of all episodes, concatenated; empty if not recorded.
         offsets: `[E + 1]`; rows `offsets[e]:offsets[e + 1]` of `trajectory` belong to episode e.
     """
 
     arena: Arena
+    task: Task
+    engine: str
     body: str
     seed: int
     seconds: float

@@ -12,23 +12,28 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.arena import Arena
+from sim.arenas import find_arena
 from sim.checks import whole_number
 from sim.columns import EpisodeColumns, StepColumns
 from sim.controller import Controller, ControllerLike, advance, append, as_controller, begin
-from sim.corral import Arena, find_arena
+from sim.engine import check_commands, control_steps
+from sim.engines import find_engine
 from sim.result import Rollout, Steps
-from sim.robot import ACTUATORS, find_body
+from sim.robot import ACTUATORS
 from sim.state import rows_of
+from sim.task import Task
 from sim.tracker import DWELL_SECONDS, Tracker
-from sim.vector_sim import VectorSim, check_commands, control_steps
 
 
 @dataclass(frozen=True)
-class _Task:
+class _Job:
     """The arguments of a worker that drives episodes."""
 
     controller: Controller
     arena: Arena
+    task: Task
+    engine: str
     body: str
     seed: int
     steps: int
@@ -40,16 +45,18 @@ class _Task:
 def rollout(
     policy: ControllerLike,
     arena: str | Arena = "default",
-    body: str = "planar",
+    body: str | None = None,
     episodes: Iterable[int] = range(200),
     seed: int = 0,
     seconds: float = 60.0,
     dwell: float = DWELL_SECONDS,
-    robots: int = 64,
+    robots: int | None = None,
     executor: Executor | None = None,
     workers: int = 1,
     record: bool = True,
     progress: Callable[[int], object] | None = None,
+    engine: str = "vector",
+    task: Task | None = None,
 ) -> Rollout:
     """Drive `policy` through `episodes` and report what happened.
 
@@ -58,50 +65,56 @@ def rollout(
     `executor`, provided that the policy treats each row independently.
 
     Args:
-        policy: a function or `nn.Module` from readings `[B, 3]` to commands `[B, 2]` (an array, a tensor, or an object
+        policy: a function or `nn.Module` from readings `[B, n]` to commands `[B, 2]` (an array, a tensor, or an object
             with `.commands`), or a `Controller`, which may have a memory.
         arena: a name in `sim.ARENAS`, or an `Arena`.
-        body: a name in `sim.BODIES`.
+        body: the robot's body: `planar`, or, in `bullet`, `wheeled`.
         episodes: distinct numbers, 0 or more; each selects one start and one sequence of wheel noise.
         seed: common to all episodes, 0 or more.
         seconds: longest duration of an episode.
         dwell: seconds at the lamp that count as success.
-        robots: robots per process, about 29 MB each.
+        robots: robots per process at once; by default 4,096 in `vector`, and 64 in `bullet`, where each has 29 MB.
         executor: where to run; it can be reused over calls, and the caller shuts it down.
         workers: number of processes, each of which gets contiguous chunks of episodes. Without an executor, more than
             one worker starts a pool for this call.
         record: whether to record every control step.
         progress: called with the number of newly finished episodes.
+        engine: `vector` steps all robots together; `bullet` is a physics engine, the truth, and much slower.
+        task: what the robot senses, and which lamps it goes to; by default all lamps of the arena, see `Task.of`.
 
     Raises:
-        ValueError: an unknown arena or body, no episodes, repeated or negative ones, or a number out of range. Commands
-            that are not finite or have the wrong shape; the message names episode and step.
+        ValueError: an unknown arena, engine or body, no episodes, repeated or negative ones, or a number out of range.
+            Commands that are not finite or have the wrong shape; the message names episode and step.
     """
-    numbers = _check_episodes(episodes)
-    robots, workers = whole_number("robots", robots, 1), whole_number("workers", workers, 1)
-    seed = whole_number("seed", seed)
-    find_body(body)
-    task = _Task(
+    numbers, chosen, where = _check_episodes(episodes), find_engine(engine), find_arena(arena)
+    task = Task.of(where) if task is None else task
+    task.check(where)
+    job = _Job(
         as_controller(policy),
-        find_arena(arena),
-        body,
-        seed,
+        where,
+        task,
+        engine,
+        chosen.find_body(body),
+        whole_number("seed", seed),
         control_steps(seconds),
         control_steps(dwell),
-        robots,
+        chosen.robots if robots is None else whole_number("robots", robots, 1),
         record,
     )
+    workers = whole_number("workers", workers, 1)
     if executor is None and workers == 1:
-        parts = [_drive(task, numbers, progress)]
+        parts = [_drive(job, numbers, progress)]
     else:
-        parts = _spread(task, numbers, executor, workers, progress)
+        parts = _spread(job, numbers, executor, workers, progress)
     merged = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     trajectory = Steps(**{field.name: merged.pop(f"row_{field.name}") for field in fields(Steps)})
     lengths = merged["steps"] if record else np.zeros(len(numbers), dtype=np.int64)
     return Rollout(
-        arena=task.arena,
-        body=body,
-        seed=seed,
+        arena=job.arena,
+        task=job.task,
+        engine=engine,
+        body=job.body,
+        seed=job.seed,
         seconds=seconds,
         dwell_seconds=dwell,
         trajectory=trajectory,
@@ -125,7 +138,7 @@ def _check_episodes(episodes: Iterable[int]) -> NDArray[np.int64]:
 
 
 def _spread(
-    task: _Task,
+    job: _Job,
     numbers: NDArray[np.int64],
     executor: Executor | None,
     workers: int,
@@ -133,12 +146,12 @@ def _spread(
 ) -> list[dict[str, NDArray[Any]]]:
     # A few chunks per worker keep the workers evenly busy and the progress moving. Chunks of fewer episodes than
     # `robots` waste time.
-    chunks = max(min(workers, len(numbers)), min(4 * workers, len(numbers) // task.robots))
+    chunks = max(min(workers, len(numbers)), min(4 * workers, len(numbers) // job.robots))
     # Not forked: a child must not inherit the parent's threads and physics clients.
     started = ProcessPoolExecutor(workers, mp_context=get_context("spawn")) if executor is None else None
     with started if started is not None else nullcontext(executor) as pool:
         assert pool is not None
-        futures = [pool.submit(_drive, task, chunk) for chunk in np.array_split(numbers, chunks)]
+        futures = [pool.submit(_drive, job, chunk) for chunk in np.array_split(numbers, chunks)]
         try:
             for future in as_completed(futures):
                 finished = len(future.result()["episode"])
@@ -152,57 +165,52 @@ def _spread(
 
 
 def _drive(
-    task: _Task, numbers: NDArray[np.int64], progress: Callable[[int], object] | None = None
+    job: _Job, numbers: NDArray[np.int64], progress: Callable[[int], object] | None = None
 ) -> dict[str, NDArray[Any]]:
     """Drive the episodes in this process. Returns columns per episode, and per control step under `row_...`."""
-    size = min(task.robots, len(numbers))
-    tracker = Tracker(size, task.dwell_steps)
-    episodes = EpisodeColumns(numbers)
-    rows = StepColumns(task.record)
-    with VectorSim(size, task.arena, task.body, task.seed) as simulator:
-        row = np.arange(size)  # the index in `numbers` of each slot's episode
-        for slot in range(size):
-            start = simulator.reset(slot, int(numbers[slot]))
-            episodes.start[slot] = start.x, start.y, start.heading
-        following = size
+    size = min(job.robots, len(numbers))
+    tracker = Tracker(size, job.dwell_steps, len(job.task.goals))
+    episodes, rows = EpisodeColumns(numbers), StepColumns(job.task)
+    with find_engine(job.engine)(size, job.arena, job.task, job.body, job.seed) as engine:
         slots = np.arange(size)
-        memory = begin(task.controller, numbers[:size])
+        row = np.arange(size)  # the index in `numbers` of each slot's episode
+        following = size
+        episodes.start[row] = engine.reset(slots, numbers[row])
+        memory = begin(job.controller, numbers[row])
         while slots.size:
-            state = simulator.observe(slots.tolist())
+            state = engine.observe(slots)
             tracker.observe(slots, state)
-            done = tracker.success[slots] | (tracker.clock[slots] >= task.steps)
-            for slot in slots[done].tolist():
-                episodes.finish(int(row[slot]), tracker, slot)
-            going = slots[~done]
-            if going.size < slots.size:
+            done = tracker.success[slots] | (tracker.clock[slots] >= job.steps)
+            going, finished = slots[~done], slots[done]
+            if finished.size:
+                episodes.finish(row[finished], tracker, finished)
                 memory = rows_of(memory, np.flatnonzero(~done))
             if going.size:
-                sensors, step = state.sensors[~done], tracker.clock[going]
-                driven = numbers[row[going]]
+                sensors, driven = state.sensors[~done], numbers[row[going]]
+                step = tracker.clock[going]
                 where = f"episode {driven[0]}, step {step[0]}"
-                answer, memory = advance(task.controller, sensors, memory, where)
+                answer, memory = advance(job.controller, sensors, memory, where)
                 commands = _check(answer, driven, step)
                 reached = tracker.first[going] >= 0
-                contact, at_lamp = state.contact[~done], state.at_lamp[~done]
-                episodes.count(row[going], contact, at_lamp, reached)
-                rows.add(row[going], step, state, ~done, commands, reached)
-                simulator.drive(going.tolist(), commands)
-            finished = slots[done]
-            refilled = finished[: len(numbers) - following]
-            for slot in refilled.tolist():
-                tracker.reset(slot)
-                start = simulator.reset(slot, int(numbers[following]))
-                episodes.start[following] = start.x, start.y, start.heading
-                row[slot] = following
-                following += 1
-            slots = np.concatenate([going, refilled])
-            if refilled.size:
+                episodes.count(row[going], state.contact[~done], tracker.at_goal[going] & reached, reached)
+                if job.record:
+                    rows.add(row[going], state, ~done, commands, tracker, going)
+                engine.drive(going, commands)
+            slots = going
+            if refilled := min(finished.size, len(numbers) - following):
+                free, new = finished[:refilled], np.arange(following, following + refilled)
+                following += refilled
+                tracker.reset(free)
+                row[free] = new
+                episodes.start[new] = engine.reset(free, numbers[new])
+                slots = np.concatenate([going, free])
                 order = np.argsort(slots)
                 slots = slots[order]
-                memory = rows_of(append(task.controller, memory, numbers[row[refilled]]), order)
+                memory = rows_of(append(job.controller, memory, numbers[new]), order)
             if progress is not None and finished.size:
                 progress(int(finished.size))
-    return episodes.columns() | rows.columns()
+    columns = episodes.columns()
+    return columns | {f"row_{name}": column for name, column in rows.columns(columns["steps"]).items()}
 
 
 def _check(answer: object, episodes: NDArray[np.int64], steps: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -7,13 +7,16 @@ from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
 import sim
+from sim.engines.bullet import Bullet
 from sim.env import MAX_STEPS
 
+ENGINES = [("vector", "planar"), ("bullet", "planar"), ("bullet", "wheeled")]
 
-@pytest.mark.parametrize("body", ["planar", "wheeled"])
-def test_gymnasium_finds_nothing_to_complain_about(body: str) -> None:
+
+@pytest.mark.parametrize(("engine", "body"), ENGINES)
+def test_gymnasium_finds_nothing_to_complain_about(engine: str, body: str) -> None:
     # Warnings are errors here, the checker's own included.
-    env = gymnasium.make("CorralEscape-v0", body=body)
+    env = gymnasium.make("CorralEscape-v0", engine=engine, body=body)
     check_env(env.unwrapped)
     env.close()
 
@@ -105,9 +108,9 @@ def test_the_vector_environment_states_its_autoreset_mode() -> None:
     vector.close()
 
 
-@pytest.mark.parametrize("body", ["planar", "wheeled"])
-def test_pictures_show_lamp_walls_and_a_robot_that_moves(body: str) -> None:
-    env = gymnasium.make("CorralEscape-v0", render_mode="rgb_array", body=body)
+@pytest.mark.parametrize(("engine", "body"), ENGINES)
+def test_pictures_show_lamp_walls_and_a_robot_that_moves(engine: str, body: str) -> None:
+    env = gymnasium.make("CorralEscape-v0", render_mode="rgb_array", engine=engine, body=body)
     env.reset(seed=1)
     before = env.render()
     assert isinstance(before, np.ndarray)
@@ -138,8 +141,9 @@ def test_vector_pictures_are_one_each() -> None:
 
 
 def test_closing_twice_is_fine() -> None:
-    env = sim.CorralEscapeEnv()
-    client = env._state.simulator.worlds[0].client
+    env = sim.CorralEscapeEnv(engine="bullet")
+    assert isinstance(env._state.engine, Bullet)
+    client = env._state.engine.worlds[0].client
     assert pybullet.getConnectionInfo(client)["isConnected"]
     env.close()
     env.close()

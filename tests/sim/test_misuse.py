@@ -11,19 +11,20 @@ import pytest
 from clients import connected
 
 import sim
-from sim.vector_sim import VectorSim, World
+from sim.engines.bullet import Bullet
+from sim.engines.world import World
 
 
 def test_dropped_environments_free_their_clients() -> None:
     before = connected()
     for number in range(30):
-        env = gymnasium.make("CorralEscape-v0")
+        env = gymnasium.make("CorralEscape-v0", engine="bullet")
         env.reset(seed=number)
         env.step(np.ones(2))
         del env
         gc.collect()
         assert connected() == before
-    vector = sim.CorralEscapeVectorEnv(3)
+    vector = sim.CorralEscapeVectorEnv(3, engine="bullet")
     vector.reset(seed=0)
     assert len(connected()) == len(before) + 3
     del vector
@@ -32,8 +33,8 @@ def test_dropped_environments_free_their_clients() -> None:
 
 
 def test_a_dropped_fleet_frees_only_its_own_clients() -> None:
-    with World(sim.Arena(), "planar") as kept:
-        simulator: VectorSim | None = VectorSim(2)
+    with World(sim.corral(), "planar") as kept:
+        simulator: Bullet | None = Bullet(2, sim.corral(), sim.Task())
         clients = [world.client for world in simulator.worlds] if simulator else []
         simulator = None
         gc.collect()
@@ -41,14 +42,19 @@ def test_a_dropped_fleet_frees_only_its_own_clients() -> None:
         assert pybullet.getConnectionInfo(kept.client)["isConnected"]
 
 
-@pytest.mark.parametrize("fails", ["build_corral", "find_body", "SensorArray"])
+@pytest.mark.parametrize("fails", ["engines.world.build", "engine.WheelNoise", "engine.Shapes"])
 def test_a_constructor_that_fails_leaves_no_client(fails: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def broken(*_: object) -> None:
         raise RuntimeError("broken")
 
     before = connected()
-    monkeypatch.setattr(f"sim.vector_sim.{fails}", broken)
-    for make in (sim.CorralEscapeEnv, lambda: sim.CorralEscapeVectorEnv(3), lambda: VectorSim(2)):
+    monkeypatch.setattr(f"sim.{fails}", broken)
+    arena, task = sim.corral(), sim.Task()
+    for make in (
+        lambda: sim.CorralEscapeEnv(engine="bullet"),
+        lambda: sim.CorralEscapeVectorEnv(3, engine="bullet"),
+        lambda: Bullet(2, arena, task),
+    ):
         with pytest.raises(RuntimeError, match="broken"):
             make()
         assert connected() == before
@@ -59,17 +65,17 @@ def test_a_rollout_that_fails_while_it_starts_leaves_no_client(monkeypatch: pyte
         raise MemoryError
 
     before = connected()
-    monkeypatch.setattr("sim.vector_sim.draw_episode", broken)
+    monkeypatch.setattr("sim.engine.draw_episodes", broken)
     with pytest.raises(MemoryError):
-        sim.rollout(sim.Teacher(), episodes=[0, 1])
+        sim.rollout(sim.Teacher(), episodes=[0, 1], engine="bullet")
     assert connected() == before
 
 
 def test_closed_environments_say_so() -> None:
-    env = sim.CorralEscapeEnv(render_mode="rgb_array")
+    env = sim.CorralEscapeEnv(render_mode="rgb_array", engine="bullet")
     env.reset(seed=0)
     env.close()
-    vector = sim.CorralEscapeVectorEnv(2, render_mode="rgb_array")
+    vector = sim.CorralEscapeVectorEnv(2, render_mode="rgb_array", engine="bullet")
     vector.reset(seed=0)
     vector.close()
     for use in (
@@ -100,14 +106,14 @@ def test_odd_seeds_and_episodes_are_refused(odd: Any) -> None:
         lambda: env.reset(seed=odd),
         lambda: vector.reset(seed=odd),
         lambda: sim.rollout(sim.Teacher(), seed=odd, episodes=[0]),
-        lambda: sim.draw_start(sim.Arena(), odd, 0),
+        lambda: sim.draw_start(sim.corral(), odd, 0),
     ):
         with pytest.raises(ValueError, match=r"seed .*; expected a whole number, 0 or more"):
             reset()
     for reset in (
         lambda: env.reset(seed=5, options={"episode": odd}),
         lambda: sim.rollout(sim.Teacher(), episodes=[0, odd]),
-        lambda: sim.draw_start(sim.Arena(), 0, odd),
+        lambda: sim.draw_start(sim.corral(), 0, odd),
     ):
         with pytest.raises(ValueError, match=r"episode .*; expected a whole number, 0 or more"):
             reset()
@@ -116,7 +122,7 @@ def test_odd_seeds_and_episodes_are_refused(odd: Any) -> None:
     following = env.reset()[1]
     assert following["episode"] == 1
     assert following["pose"].tolist() != pose.tolist()
-    start = sim.draw_start(sim.Arena(), 3, 1)
+    start = sim.draw_start(sim.corral(), 3, 1)
     assert following["pose"][:2].tolist() == [start.x, start.y]
     env.close()
     vector.close()
@@ -162,7 +168,7 @@ def test_actions_are_real_numbers(action: Any) -> None:
         (lambda: sim.CorralEscapeEnv(dwell=1e308), "1e.308 s; expected a finite time"),
         (lambda: sim.CorralEscapeEnv(body=["planar"]), "unknown body"),  # pyright: ignore[reportArgumentType]
         (lambda: sim.CorralEscapeEnv(arena=["default"]), "unknown arena"),  # pyright: ignore[reportArgumentType]
-        (lambda: sim.Arena(gap=True), "Arena.gap is True"),
+        (lambda: sim.corral(side=-1.0), "Box.half_x is -0.5; expected"),
         (lambda: sim.rollout(sim.Teacher(), robots=1.5), "robots 1.5; expected"),  # pyright: ignore[reportArgumentType]
         (lambda: sim.rollout(sim.Teacher(), workers=True), "workers True; expected"),
     ],

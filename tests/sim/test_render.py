@@ -24,7 +24,7 @@ def pair() -> tuple[Rollout, Rollout]:
 
 def test_the_corral_is_drawn_to_scale() -> None:
     ax = Figure().subplots()
-    render.draw_corral(ax, sim.Arena())
+    render.draw_corral(ax, sim.corral())
     (left, right), (bottom, top) = ax.get_xlim(), ax.get_ylim()
     assert left < -1.5 < 2.3 + 0.15 < right
     assert bottom < -1.5 < 1.5 < top
@@ -85,7 +85,7 @@ def test_misuse_is_named_and_leaves_no_file(pair: tuple[Rollout, Rollout], tmp_p
     with pytest.raises(ValueError, match="one title per rollout"):
         render.animate(pair, ["teacher"], path)
     with pytest.raises(ValueError, match="different arenas"):
-        render.animate([pair[0], dataclasses.replace(pair[1], arena=sim.ARENAS["large"])], ["a", "b"], path)
+        render.animate([pair[0], dataclasses.replace(pair[1], arena=sim.find_arena("large"))], ["a", "b"], path)
     with pytest.raises(ValueError, match="speed=0"):
         render.animate(pair, ["a", "b"], path, speed=0)
     with pytest.raises(KeyError, match="episode 77"):

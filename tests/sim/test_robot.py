@@ -5,12 +5,26 @@ import pybullet
 import pytest
 
 import sim
-from sim.corral import Start
-from sim.robot import CONTROL_HZ, HEIGHT, MAX_SPEED, RADIUS, TRACK, find_body
-from sim.vector_sim import TOUCH, VectorSim, World
+from sim.arena import Start
+from sim.engine import Engine
+from sim.engines import find_engine
+from sim.engines.bodies import HEIGHT
+from sim.engines.bullet import Bullet
+from sim.engines.world import World
+from sim.robot import CONTROL_HZ, MAX_SPEED, RADIUS, TOUCH, TRACK
 
-ARENA = sim.Arena(side=3.0, gap=1.0, lamp_beyond=0.8)
+ARENA = sim.corral(side=3.0, gap=1.0, lamp_beyond=0.8)
 BODIES = ["planar", "wheeled"]
+ENGINES = [("vector", "planar"), ("bullet", "planar"), ("bullet", "wheeled")]
+SLOT = np.array([0])
+
+
+def placed(engine: str, body: str, start: Start) -> Engine:
+    """One robot at a start that no episode has."""
+    made = find_engine(engine)(1, ARENA, sim.Task(), body)
+    made.reset(SLOT, SLOT)
+    made._place(SLOT, np.array([[start.x, start.y, start.heading]]))
+    return made
 
 
 def height(world: World) -> float:
@@ -76,13 +90,12 @@ def test_the_planar_body_never_leaves_its_plane() -> None:
 
 
 def test_a_minute_against_the_lamp_does_not_lift_the_planar_body() -> None:
-    with VectorSim(1, ARENA, "planar") as simulator:
-        simulator.reset(0, 0)
-        simulator._poses[0] = simulator.worlds[0].body.place(Start(1.9, 0.02, 0.0))
+    with placed("bullet", "planar", Start(1.9, 0.02, 0.0)) as engine:
+        assert isinstance(engine, Bullet)
         teacher = sim.Teacher()
         for _ in range(60 * CONTROL_HZ):
-            simulator.drive([0], teacher(simulator.observe([0]).sensors))
-        assert height(simulator.worlds[0]) == pytest.approx(HEIGHT, abs=1e-5)
+            engine.drive(SLOT, teacher(engine.observe(SLOT).sensors))
+        assert height(engine.worlds[0]) == pytest.approx(HEIGHT, abs=1e-5)
 
 
 def test_the_wheeled_body_stays_on_the_floor() -> None:
@@ -93,18 +106,16 @@ def test_the_wheeled_body_stays_on_the_floor() -> None:
             assert height(world) == pytest.approx(HEIGHT, abs=0.003)
 
 
-@pytest.mark.parametrize("body", BODIES)
-def test_a_robot_that_faces_the_lamp_comes_to_rest_against_it_and_stays(body: str) -> None:
-    with VectorSim(1, ARENA, body) as simulator:
-        simulator.reset(0, 0)
-        simulator._poses[0] = simulator.worlds[0].body.place(Start(1.0, 0.1, 0.0))
+@pytest.mark.parametrize(("engine", "body"), ENGINES)
+def test_a_robot_that_faces_the_lamp_comes_to_rest_against_it_and_stays(engine: str, body: str) -> None:
+    with placed(engine, body, Start(1.0, 0.1, 0.0)) as robot:
         teacher, touching = sim.Teacher(), []
-        state = simulator.observe([0])
+        state = robot.observe(SLOT)
         for _ in range(20 * CONTROL_HZ):
-            simulator.drive([0], teacher(state.sensors))
-            state = simulator.observe([0])
-            touching.append(bool(state.at_lamp[0]))
-        assert math.hypot(state.x[0] - 2.3, state.y[0]) == pytest.approx(RADIUS + ARENA.lamp_radius, abs=TOUCH)
+            robot.drive(SLOT, teacher(state.sensors))
+            state = robot.observe(SLOT)
+            touching.append(bool(state.at_goals[0, 0]))
+        assert math.hypot(state.x[0] - 2.3, state.y[0]) == pytest.approx(RADIUS + ARENA.lamps[0].radius, abs=TOUCH)
     first = touching.index(True)
     assert first < 5 * CONTROL_HZ
     assert np.mean(touching[first:]) > 0.95
@@ -125,6 +136,10 @@ def test_a_placed_robot_behaves_as_a_new_one(body: str) -> None:
         assert path(used, start, 200) == expected
 
 
-def test_unknown_bodies_are_named() -> None:
+def test_unknown_bodies_and_engines_are_named() -> None:
     with pytest.raises(ValueError, match=r"unknown body 'flying'.*'planar', 'wheeled'"):
-        find_body("flying")
+        find_engine("bullet").find_body("flying")
+    with pytest.raises(ValueError, match=r"unknown body 'wheeled'.*'planar'.*engine='bullet' has wheels"):
+        find_engine("vector").find_body("wheeled")
+    with pytest.raises(ValueError, match=r"unknown engine 'steam'.*'bullet', 'vector'"):
+        find_engine("steam")

@@ -10,10 +10,9 @@ import policies
 import pytest
 
 import sim
-from sim.corral import draw_start
+from sim.arena import draw_start
 from sim.result import Rollout, Steps
-from sim.robot import CONTROL_HZ, RADIUS
-from sim.vector_sim import TOUCH
+from sim.robot import CONTROL_HZ, RADIUS, TOUCH
 
 
 def equal(a: Rollout, b: Rollout) -> bool:
@@ -30,10 +29,10 @@ def teacher() -> Rollout:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("body", ["planar", "wheeled"])
+@pytest.mark.parametrize(("engine", "body"), [("vector", "planar"), ("bullet", "planar"), ("bullet", "wheeled")])
 @pytest.mark.parametrize("policy", [sim.Teacher(), policies.random])
-def test_batch_size_and_order_change_no_bit(body: str, policy: sim.ControllerLike) -> None:
-    run: dict[str, Any] = {"body": body, "seed": 4, "seconds": 12.0}
+def test_batch_size_and_order_change_no_bit(engine: str, body: str, policy: sim.ControllerLike) -> None:
+    run: dict[str, Any] = {"engine": engine, "body": body, "seed": 4, "seconds": 12.0}
     alone = sim.rollout(policy, episodes=range(5), robots=1, **run)
     assert equal(alone, sim.rollout(policy, episodes=range(5), robots=1, **run))
     assert equal(alone, sim.rollout(policy, episodes=range(5), robots=16, **run))
@@ -43,7 +42,7 @@ def test_batch_size_and_order_change_no_bit(body: str, policy: sim.ControllerLik
         for field in dataclasses.fields(Steps):
             ours, theirs = (getattr(r.slice(episode), field.name) for r in (backwards, alone))
             assert np.array_equal(ours, theirs)
-    assert not equal(alone, sim.rollout(policy, episodes=range(5), body=body, seed=5, seconds=12.0))
+    assert not equal(alone, sim.rollout(policy, episodes=range(5), **{**run, "seed": 5}))
 
 
 @pytest.mark.slow
@@ -68,7 +67,7 @@ def test_progress_counts_every_episode_once() -> None:
 
 def test_every_controller_meets_the_same_starts() -> None:
     runs = [sim.rollout(policy, episodes=range(10), seed=7, seconds=1.0) for policy in (sim.Teacher(), policies.random)]
-    expected = [dataclasses.astuple(draw_start(sim.Arena(), 7, episode)) for episode in range(10)]
+    expected = [dataclasses.astuple(draw_start(sim.corral(), 7, episode)) for episode in range(10)]
     for run in runs:
         assert run.start.tolist() == [list(start) for start in expected]
         assert [(path.x[0], path.y[0]) for path in map(run.slice, range(10))] == [(x, y) for x, y, _ in expected]
@@ -87,7 +86,7 @@ def test_every_controller_meets_the_same_wheel_noise() -> None:
 
 
 def test_wheel_noise_has_the_stated_size() -> None:
-    arena = sim.Arena(side=9.0, wheel_noise=0.3)
+    arena = sim.corral(side=9.0, wheel_noise=0.3)
     path = sim.rollout(policies.forward, arena=arena, episodes=range(40), seconds=2.0)
     speed, turn = [], []
     for episode in range(40):
@@ -103,20 +102,21 @@ def test_wheel_noise_has_the_stated_size() -> None:
 
 
 def test_no_noise_is_exact() -> None:
-    path = sim.rollout(policies.forward, arena=sim.Arena(wheel_noise=0.0), episodes=[1], seconds=0.5).trajectory
+    path = sim.rollout(policies.forward, arena=sim.corral(wheel_noise=0.0), episodes=[1], seconds=0.5).trajectory
     assert np.hypot(np.diff(path.x), np.diff(path.y)) == pytest.approx(np.full(9, 0.4 / CONTROL_HZ), abs=1e-12)
 
 
 def test_the_record_explains_the_figures(teacher: Rollout) -> None:
-    lamp = np.array(teacher.arena.lamp)
+    (lamp,) = teacher.arena.lamps
     assert teacher.success.all()
     assert teacher.escaped.all()
     for row, episode in enumerate(teacher.episode.tolist()):
         path = teacher.slice(episode)
         assert path.step.tolist() == list(range(teacher.steps[row]))
         assert np.array_equal(path.commands, sim.Teacher()(path.sensors))
-        gap = np.hypot(path.x - lamp[0], path.y - lamp[1]) - RADIUS - teacher.arena.lamp_radius
+        gap = np.hypot(path.x - lamp.x, path.y - lamp.y) - RADIUS - lamp.radius
         assert np.array_equal(path.at_lamp, gap <= TOUCH)
+        assert not path.goal.any()
         first = int(np.argmax(path.at_lamp))
         assert teacher.time_to_light[row] == first / CONTROL_HZ
         assert np.array_equal(path.reached, path.step >= first)
@@ -251,7 +251,7 @@ def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
 @pytest.mark.slow
 def test_the_teacher_solves_the_default_arena_on_both_bodies_and_chance_does_not() -> None:
     planar = sim.rollout(sim.Teacher(), episodes=range(1000, 1060)).summary()
-    wheeled = sim.rollout(sim.Teacher(), body="wheeled", episodes=range(1000, 1060)).summary()
+    wheeled = sim.rollout(sim.Teacher(), engine="bullet", body="wheeled", episodes=range(1000, 1060)).summary()
     chance = sim.rollout(policies.random, episodes=range(1000, 1020), record=False).summary()
     assert planar.success_rate >= 0.97
     assert abs(planar.success_rate - wheeled.success_rate) <= 0.05

@@ -5,7 +5,7 @@ import pytest
 
 import sim
 from sim.sensors import DISTANCE_MAX, LIGHT_MAX
-from sim.teacher import OBSTACLE
+from sim.teachers.escape import OBSTACLE
 
 # The five rules of the paper's section IV, for each combination of what is sensed: left light, right light, obstacle.
 TRUTH: dict[tuple[bool, ...], tuple[str, list[int]]] = {

@@ -1,4 +1,4 @@
-"""Import pybullet without the build time that it prints in every process: `from sim._pybullet import pybullet`."""
+"""Import pybullet without the build time that it prints in every process."""
 
 import os
 import sys

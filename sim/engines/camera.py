@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from sim._pybullet import pybullet
-from sim.corral import Arena
+from sim.arena import Arena
+from sim.engines._pybullet import pybullet
 
 
 def render_rgb(client: int, arena: Arena, width: int = 480, height: int = 360) -> NDArray[np.uint8]:
-    """Render the world of `client` from obliquely above as `[height, width, 3]` uint8; the lamp is on the right.
+    """Render the world of `client` from obliquely above as `[height, width, 3]` uint8; x grows to the right.
 
     Raises `ValueError` for a size below 1 pixel.
     """
     if width < 1 or height < 1:
         raise ValueError(f"a picture of {width} x {height} pixels; expected at least 1 x 1")
-    lamp_x, _ = arena.lamp
-    length = lamp_x + arena.side / 2 + 0.5
+    low, high, *_ = arena.extent()
+    length, wide = high - low + 0.3, 2 * arena.floor.half_y
     view = pybullet.computeViewMatrixFromYawPitchRoll(
-        cameraTargetPosition=[(lamp_x - arena.side / 2) / 2 - 0.1, -0.05 * arena.side, 0.0],
+        cameraTargetPosition=[(low + high) / 2 - 0.1, arena.floor.y - 0.05 * wide, 0.0],
         distance=1.06 * length,
         yaw=0.0,
         pitch=-62.0,
