@@ -13,7 +13,7 @@ import sim
 from behaviours import Behaviour, Demonstrations, Policy, Schema
 from experiments.tasks import corral
 from sim.sensors import DISTANCE_MAX, LIGHT_MAX
-from sim.teacher import OBSTACLE
+from sim.teachers.escape import OBSTACLE
 
 COMMANDS = ("forward", "turn left", "turn right", "other")
 """Names of commands; a command counts by its nearest levels, and what has no name is `other`."""

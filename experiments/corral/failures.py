@@ -12,7 +12,7 @@ import sim
 from behaviours import Behaviour, Demonstrations, Policy
 from behaviours.ordered import distinct_rows
 from experiments.corral.command_map import COMMANDS, kinds
-from sim.teacher import TEACHER_COMMANDS
+from sim.teachers.escape import TEACHER_COMMANDS
 
 PLACES = ("inside the corral", "outside, away from the lamp", "at the lamp, not long enough")
 """Where a robot that did not succeed can be at the end."""
@@ -21,8 +21,7 @@ PLACES = ("inside the corral", "outside, away from the lamp", "at the lamp, not 
 def ends(rollout: sim.Rollout) -> list[str | None]:
     """Where each robot of a recorded rollout was at the end, one of `PLACES`; None for those that succeeded."""
     path, last = rollout.trajectory, rollout.offsets[1:] - 1
-    half = rollout.arena.side / 2
-    inside = (np.abs(path.x[last]) < half) & (np.abs(path.y[last]) < half)
+    inside = rollout.arena.floor.holds(path.x[last], path.y[last])
     place = np.where(path.at_lamp[last], 2, np.where(inside, 0, 1)).tolist()
     return [None if success else PLACES[at] for at, success in zip(place, rollout.success.tolist(), strict=True)]
 

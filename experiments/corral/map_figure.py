@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 import sim
 from experiments.corral.command_map import COMMANDS, DISTANCE, SLICES, Slice
 from experiments.kit.figures import BLACK
-from sim.teacher import OBSTACLE
+from sim.teachers.escape import OBSTACLE
 
 HATCH = "#4A545E"
 COLOURS = dict(zip(COMMANDS, ("#A9D3EE", "#F2C14E", "#D58FB5", "#D0D5DA"), strict=True))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import sim
 from behaviours import Behaviour, Policy
 from experiments.corral.command_map import kinds
-from sim.teacher import TEACHER_COMMANDS
+from sim.teachers.escape import TEACHER_COMMANDS
 from sim.tracker import DWELL_SECONDS
 
 SHOWN = 12

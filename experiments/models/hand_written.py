@@ -17,7 +17,7 @@ from behaviours.ordered import distinct_rows
 from experiments.models.largest_margin import largest_margin, margin, whole
 from experiments.tasks.corral import schema as learners_schema
 from sim.sensors import LIGHT_MAX
-from sim.teacher import OBSTACLE, TEACHER_COMMANDS
+from sim.teachers.escape import OBSTACLE, TEACHER_COMMANDS
 from torchvsa import VSA
 from torchvsa.encoders import Lookup, Sum
 

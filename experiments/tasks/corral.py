@@ -27,16 +27,16 @@ FIRST_VALIDATION = 2_000_000
 
 GROUPS["arena"] = Group(
     sim.ARENAS,
+    given=frozenset({"within"}),
     meanings={
         "side": "inner edge length of the corral, m",
-        "gap": "width of the opening, m",
+        "gap": "width of an opening, m",
         "gap_offset": "y of the opening's middle, m",
+        "apart": "distance between the middles of the two openings, m",
         "lamp_beyond": "distance from the wall with the gap to the lamp, m",
         "lamp_offset": "y of the lamp relative to the opening's middle, m",
         "lamp_radius": "m",
-        "lamp_height": "m; below the sensors",
-        "wall_height": "m; above the sensors",
-        "wall_thickness": "m",
+        "layout": "number from which the obstacles are drawn",
         "start_margin": "smallest distance from a start to a wall, m",
         "wheel_noise": "standard deviation of a wheel's speed, as a share of the commanded speed",
     },
@@ -47,9 +47,12 @@ GROUPS["arena"] = Group(
 class Driving(Settings):
     """How robots are driven."""
 
-    body: str = setting("planar", "the robot's body", choices=lambda: sim.BODIES)
+    engine: str = setting("vector", "what moves the robots: bullet is the truth, vector is fast", choices=sim.ENGINES)
+    body: str = setting("planar", "the robot's body; wheeled in bullet only", choices=sim.BODIES)
     seconds: float = setting(60.0, "longest duration of an episode, s", above=0)
-    robots: int = setting(64, "robots per process, about 29 MB each", low=1)
+    robots: int | None = setting(
+        None, "robots per process at once; null for 4,096, and for 64 in bullet, where each has 29 MB", low=1
+    )
 
 
 @dataclass
@@ -93,8 +96,9 @@ def space(settings: Learning, bins: int | None = None) -> Space:
 
 def arena(options: parts.Options) -> sim.Arena:
     """The arena of the group `arena`."""
-    parts.known_only("arena", options, sim.Arena)
-    return sim.Arena(**{key: value for key, value in options.items() if key != "name"})
+    made = sim.ARENAS[options["name"]]
+    parts.known_only("arena", options, made)
+    return made(**{key: value for key, value in options.items() if key != "name"})
 
 
 def frozen(policy: sim.ControllerLike) -> sim.ControllerLike:
@@ -112,13 +116,12 @@ def drive(
     policy: sim.ControllerLike,
     episodes: Iterable[int],
     arena: str | sim.Arena = "default",
-    body: str | None = None,
     record: bool = False,
 ) -> sim.Rollout:
     """Drive in this process, as a cell does."""
     return sim.rollout(
-        frozen(policy), arena, body or settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
-        record=record,
+        frozen(policy), arena, settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
+        record=record, engine=settings.engine,
     )  # fmt: skip
 
 
@@ -135,7 +138,7 @@ def drive_together(
     with processes(settings.workers) as executor:
         return sim.rollout(
             policy, arena, settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
-            executor=executor, workers=1 if executor is None else settings.workers,
+            executor=executor, workers=1 if executor is None else settings.workers, engine=settings.engine,
             progress=lambda count: progress.advance(task, count),
         )  # fmt: skip
 

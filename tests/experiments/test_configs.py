@@ -49,7 +49,7 @@ def test_every_option_composes_and_builds(option: str) -> None:
     if bins is not None:
         assert len(command_maps(policy, bins, shown)) == 4 * 32**2
     if option.startswith("arena="):
-        assert corral.arena(config.arena) == sim.ARENAS[option.removeprefix("arena=")]
+        assert corral.arena(config.arena) == sim.find_arena(option.removeprefix("arena="))
 
 
 def test_the_default_table_has_the_promised_rows() -> None:

@@ -10,7 +10,7 @@ import sim
 import torchvsa
 from behaviours import Behaviour, Controller
 from experiments.models import hand_written
-from sim.teacher import TEACHER_COMMANDS
+from sim.teachers.escape import TEACHER_COMMANDS
 
 READINGS = np.array(list(product([0.5, 5.0], [0.5, 5.0], [0.1, 0.9])))
 KINDS = [(name, None) for name in torchvsa.ARCHITECTURES] + [(f"MAP-{variant}", "int8") for variant in "BCI"]

@@ -139,7 +139,7 @@ def test_rays_meet_what_the_rays_of_pybullet_meet() -> None:
         return Shapes([larger(shape, by) for shape in arena.obstacles]).first_hit(x, y, to_x, to_y)
 
     assert (theirs < 1).mean() > 0.2
-    assert (np.abs(grown(0.0) - theirs) < 1e-6).mean() > 0.95
+    assert (np.abs(grown(0.0) - theirs) < 1e-3).mean() > 0.98
     assert (grown(GRAZE) <= theirs + 1e-6).all()
     assert (theirs <= grown(-GRAZE) + 1e-6).all()
 

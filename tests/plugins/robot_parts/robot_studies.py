@@ -1,6 +1,6 @@
 """An arena and a study of a user's own: how long does the teacher take in corrals with gaps of different widths?"""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pandas as pd
 
@@ -8,7 +8,13 @@ import sim
 from experiments.kit import Cell, Column, Row, Study, Table, grid, setting
 from experiments.tasks.corral import Driving, drive
 
-sim.ARENAS["hall"] = sim.Arena(side=4.0, gap=1.4)
+
+def hall(gap: float = 1.4) -> sim.Arena:
+    """A large corral with two pillars."""
+    return sim.corral(side=4.0, gap=gap, within=(sim.Pillar(-1.0, 0.8, 0.2), sim.Pillar(-1.0, -0.8, 0.2)))
+
+
+sim.ARENAS["hall"] = hall
 
 
 @dataclass
@@ -22,7 +28,7 @@ class Gaps(Driving):
 
 def measure(settings: Gaps, cell: Cell) -> list[Row]:
     """A row per episode."""
-    arena = replace(sim.ARENAS[settings.arena], gap=cell["gap"])
+    arena = sim.ARENAS[settings.arena](gap=cell["gap"])
     rollout = drive(settings, sim.Teacher(), range(settings.starts), arena)
     return [
         {"episode": episode, "success": success}
