@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.checks import whole_number
-from sim.robot import RADIUS
+from sim.robot import RADIUS, TOUCH
 from sim.shapes import Box, Lamp, Obstacle, Shapes, finite
 
 Floats = NDArray[np.float64]
@@ -65,6 +65,10 @@ class Arena:
             )
         if self.wheel_noise < 0:
             raise ValueError(f"Arena.wheel_noise is {self.wheel_noise}; expected a fraction of the speed, 0 or more")
+
+    def touched(self, x: Floats, y: Floats) -> NDArray[np.bool_]:
+        """Whether robots at these positions touch an obstacle or a lamp, `[B]`."""
+        return Shapes([*self.obstacles, *self.lamps]).distance(x, y) - RADIUS <= TOUCH
 
     def extent(self) -> tuple[float, float, float, float]:
         """The smallest and the largest x, the smallest and the largest y of all that there is, m."""

@@ -1,0 +1,183 @@
+"""Do the two engines say the same? The same controllers drive from the same starts in `vector` and in `bullet`.
+
+Success, time to the lamp and collisions are compared in every arena, and single paths until the robot first touches
+anything: after that a difference in the last digit grows, and paths part.
+
+    torchvsa engines
+    torchvsa engines arenas=[default,clutter] controllers=[teacher] starts=200
+"""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.figure import Figure
+
+import sim
+from behaviours import BehaviourBank
+from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Study, Table, grid, part, parts, setting
+from experiments.kit.figures import BLUE, VERMILION
+from experiments.kit.intervals import bootstrap
+from experiments.tasks import corral
+
+MEASURES = {"success": "success", "time_to_light_s": "time to the lamp (s)", "collisions": "share of time in contact"}
+"""What is compared, as means over the starts; the time of successful episodes only."""
+ENGINES = ("vector", "bullet")
+
+
+@dataclass
+class Engines(corral.Learning):
+    """The settings of this study."""
+
+    composition: Part = part("composition", "bundle", "how `bundled` combines its behaviours")
+    arenas: list[str] = setting(list(sim.ARENAS), "arenas", choices=sim.ARENAS, distinct=True)
+    controllers: list[str] = setting(
+        ["teacher", "default", "bundled"], "what drives; the learned ones in arenas with one light only",
+        choices=["teacher", "default", "bundled"], distinct=True,
+    )  # fmt: skip
+    starts: int = setting(1000, "common starts", low=2)
+    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+
+
+def cells(settings: Engines) -> list[Cell]:
+    """A cell for each controller and arena, which drives in both engines."""
+    found = grid(arena=settings.arenas, controller=settings.controllers)
+    return [cell for cell in found if cell["controller"] == "teacher" or one_light(cell["arena"])]
+
+
+def one_light(arena: str) -> bool:
+    """Whether a robot that senses one light can drive there."""
+    return sim.Task.of(sim.find_arena(arena)) == sim.Task()
+
+
+def prepare(settings: Engines, folder: Path, progress: Any) -> dict[str, Any]:
+    """Let the teacher demonstrate in the default arena, and learn."""
+    first = corral.FIRST_DEMONSTRATION
+    episodes = range(first, first + settings.demonstrations)
+    train = corral.moving(corral.drive_together(settings, "teacher demonstrates", sim.Teacher(), episodes, progress))
+    space, rule, fires = corral.space(settings), parts.rule(settings.rule), sim.Teacher().rule(train.sensors.numpy())
+    bank = BehaviourBank(space)
+    for name, rules in sim.BEHAVIOURS.items():
+        bank.learn(name, train.where(np.isin(fires, rules)), rule)
+    learned = {"default": rule.fit(space, train), "bundled": parts.policy(bank, settings.composition)}
+    return {"settings": settings, **learned}
+
+
+def measure(material: dict[str, Any], cell: Cell) -> list[Row]:
+    """A row for each start and engine, and how far the two paths are apart before the first touch, m."""
+    settings, name = material["settings"], cell["controller"]
+    arena = sim.find_arena(cell["arena"])
+    controller = sim.InOrder(sim.Task.of(arena)) if name == "teacher" else material[name]
+    runs = [
+        corral.drive(replace(settings, engine=engine), controller, range(settings.starts), arena, record=True)
+        for engine in ENGINES
+    ]
+    rows = []
+    for episode in range(settings.starts):
+        apart = before_touch(arena, *(run.slice(episode) for run in runs))
+        for engine, run in zip(ENGINES, runs, strict=True):
+            columns = run.success, run.time_to_light, run.collisions
+            success, seconds, collisions = (column[episode].item() for column in columns)
+            row = {"engine": engine, "episode": episode, "success": float(success), "collisions": collisions}
+            rows.append({**row, "time_to_light_s": seconds if success else None, "apart_m": apart})
+    return rows
+
+
+def before_touch(arena: sim.Arena, one: sim.Steps, other: sim.Steps) -> float:
+    """The largest distance between two paths, m, before either touches an obstacle or a lamp."""
+    steps = min(len(one), len(other))
+    touches = np.zeros(steps, dtype=np.bool_)
+    for path in (one, other):
+        touches |= arena.touched(path.x[:steps], path.y[:steps])
+    free = slice(int(np.argmax(touches)) if touches.any() else steps)
+    return float(np.hypot(one.x[free] - other.x[free], one.y[free] - other.y[free]).max(initial=0.0))
+
+
+def summarise(settings: Engines, records: pd.DataFrame) -> list[Row]:
+    """A row for each arena, controller and measure: both means with bootstrap intervals over the starts."""
+    table: list[Row] = []
+    for cell in cells(settings):
+        own = records[(records.arena == cell["arena"]) & (records.controller == cell["controller"])]
+        for measured in MEASURES:
+            row = {**cell, "measure": measured}
+            for engine in ENGINES:
+                values = own.loc[own.engine == engine, measured].dropna().to_numpy()
+                low, high = bootstrap(values) if len(values) > 1 else (None, None)
+                row |= {engine: values.mean() if len(values) else None, f"{engine}_low": low, f"{engine}_high": high}
+            table.append({**row, "agree": agree(row), "apart_m": own.apart_m.max()})
+    return table
+
+
+def agree(row: Row) -> bool:
+    """Whether each engine's mean is in the other's interval."""
+    if any(row[f"{engine}_low"] is None for engine in ENGINES):
+        return row["vector"] == row["bullet"]
+    within = [row[f"{other}_low"] <= row[engine] <= row[f"{other}_high"] for engine, other in (ENGINES, ENGINES[::-1])]
+    return all(within)
+
+
+def headline(outcome: Outcome) -> str:
+    """How many comparisons agree, and how far paths are apart."""
+    agreed, apart = sum(row["agree"] for row in outcome.table), max(row["apart_m"] for row in outcome.table)
+    return (
+        f"In {agreed} of {len(outcome.table)} comparisons each engine's mean is in the other's 95 % interval; before "
+        f"robots touch anything, paths are at most {1000 * apart:.2g} mm apart."
+    )
+
+
+def intervals(outcome: Outcome) -> Figure:
+    """Both means and intervals of each comparison."""
+    figure = Figure(figsize=(10.5, 0.6 + 0.34 * len(outcome.table) / len(MEASURES)), layout="constrained")
+    panels = figure.subplots(1, len(MEASURES), sharey=True)
+    for axes, (measured, title) in zip(panels, MEASURES.items(), strict=True):
+        rows = [row for row in outcome.table if row["measure"] == measured]
+        for engine, colour, shift in zip(ENGINES, (BLUE, VERMILION), (-0.15, 0.15), strict=True):
+            for place, row in enumerate(rows):
+                if row[engine] is not None:
+                    axes.plot([row[f"{engine}_low"], row[f"{engine}_high"]], [place + shift] * 2, color=colour)
+                    label = engine if place == 0 else None
+                    axes.plot(row[engine], place + shift, "o", markersize=3.5, color=colour, label=label)
+        axes.set_yticks(range(len(rows)), [f"{row['arena']}, {row['controller']}" for row in rows])
+        axes.set_title(title)
+    panels[0].invert_yaxis()
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+    return figure
+
+
+TABLE = Table(
+    "Both engines from the same starts",
+    [
+        Column("arena"),
+        Column("controller"),
+        Column("measure", format=lambda row: MEASURES[row["measure"]]),
+        Column("vector", format=".4f", interval=("vector_low", "vector_high")),
+        Column("bullet", format=".4f", interval=("bullet_low", "bullet_high")),
+        Column(
+            "agree", format=lambda row: "yes" if row["agree"] else "no", about="each mean is in the other's interval"
+        ),
+        Column("apart_m", "apart (m)", ".1e", about="largest distance between two paths before the first touch"),
+    ],
+)
+METHOD = """
+Each controller drives from the same starts with the same wheel noise, in `vector` and in `bullet` with the planar body.
+Means are over the starts, the time to the lamp over successful ones; intervals are the bootstrap's, 95 %. The teacher
+goes to all lamps of the arena in their order. `default` and `bundled` learned in the default arena.
+"""
+
+study = Study(
+    name="engines",
+    about="Does the fast engine say the same as the physics engine?",
+    settings=Engines,
+    cells=cells,
+    prepare=prepare,
+    measure=measure,
+    summarise=summarise,
+    keys=("arena", "controller", "measure"),
+    table=TABLE,
+    figures=[Drawing("engines", intervals, "means and intervals of both engines, by arena and controller")],
+    headline=headline,
+    method=METHOD,
+    presets={"quick": {"arenas": ["default", "two_lamps"], "controllers": ["teacher"], "starts": 20}},
+)
