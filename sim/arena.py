@@ -123,19 +123,19 @@ def draw_episodes(arena: Arena, seed: int, episodes: Iterable[int]) -> tuple[Flo
 
     A generator is seeded with (seed, episode), so every controller gets the same start and the same noise at any batch
     size, worker count or order. Positions are uniform over the floor without its margin and without the surroundings
-    of obstacles, headings over the circle. Raises `ValueError` unless seed and episodes are whole numbers, 0 or more,
+    of obstacles and lamps, headings over the circle. Raises `ValueError` unless seed and episodes are whole numbers, 0 or more,
     and if no free place is found.
     """
     seed = whole_number("seed", seed)
     generators = [np.random.default_rng([seed, whole_number("episode", episode)]) for episode in episodes]
-    floor, margin, obstacles = arena.floor, arena.start_margin, Shapes(arena.obstacles)
+    floor, margin, solids = arena.floor, arena.start_margin, Shapes([*arena.obstacles, *arena.lamps])
     middle = np.array([floor.x, floor.y, 0.0])
     reach = np.array([floor.half_x - margin, floor.half_y - margin, math.pi])
     starts, open_rows = np.empty((len(generators), 3)), np.arange(len(generators))
     for _ in range(_TRIES):
         draws = np.array([generators[row].uniform(-1.0, 1.0, size=3) for row in open_rows.tolist()]).reshape(-1, 3)
         starts[open_rows] = middle + draws * reach
-        free = obstacles.distance(*starts[open_rows, :2].T) >= margin - 1e-9  # the margin itself, rounded, is free
+        free = solids.distance(*starts[open_rows, :2].T) >= margin - 1e-9  # the margin itself, rounded, is free
         open_rows = open_rows[~free]
         if not open_rows.size:
             return starts, generators

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from sim.task import Task
 from sim.teachers.escape import sensed
 
-INNER_WHEEL = 0.7
-"""Speed of the right wheel on the arc back to the wall: a circle of .74 m radius."""
+INNER_WHEEL = 0.85
+"""Speed of the right wheel on the arc back to the wall: a circle of 1.6 m radius, which fits in few corrals."""
 
 
 class WallFollowing:
