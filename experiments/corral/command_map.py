@@ -10,7 +10,8 @@ import torch
 from numpy.typing import NDArray
 
 import sim
-from behaviours import Behaviour, Demonstrations, Policy, Schema
+from behaviours import Behaviour, Demonstrations, Policy
+from behaviours.ordered import distinct_rows
 from experiments.tasks import corral
 from sim.sensors import DISTANCE_MAX, LIGHT_MAX
 from sim.teachers.escape import OBSTACLE
@@ -48,20 +49,8 @@ SLICES = (
 def kinds(commands: NDArray[np.float64]) -> NDArray[np.int64]:
     """Commands `[N, 2]` as indices into `COMMANDS`."""
     left, right = (corral.schema().command_levels(commands) - 1).numpy().T
-    turns = np.where(left < right, 1, 2)
-    return np.where(np.abs(left * right) == 0, 3, np.where(left == right, np.where(left > 0, 0, 3), turns))
-
-
-def cell_readings(schema: Schema, bins: int) -> NDArray[np.float64]:
-    """The reading that stands for each bin of each sensor, `[sensors, bins]`.
-
-    The middle of the bin, and for the last bin the end of the range, which is what the corral's sensors read where
-    they sense nothing.
-    """
-    low, high = np.array([(sensor.low, sensor.high) for sensor in schema.sensors]).T
-    middles = low[:, None] + (high - low)[:, None] * (np.arange(bins) + 0.5) / bins
-    middles[:, -1] = high
-    return middles
+    named = [(left == 1) & (right == 1), (left == -1) & (right == 1), (left == 1) & (right == -1)]
+    return np.select(named, [0, 1, 2], 3)
 
 
 def command_maps(program: Behaviour | Policy, bins: int, held_out: Demonstrations) -> pd.DataFrame:
@@ -73,19 +62,25 @@ def command_maps(program: Behaviour | Policy, bins: int, held_out: Demonstration
 def command_map(program: Behaviour | Policy, bins: int, plane: Slice, held_out: Demonstrations) -> pd.DataFrame:
     """Ask a program, and the teacher, in every cell of a slice.
 
+    A cell is asked at the middle of each bin, and in the last bin at the end of the range, which is what the corral's
+    sensors read where they sense nothing.
+
     The columns: the title of the `slice`; `row` and `column`, the bins of its y and x; the three readings; the
     commands `learned` and `teacher`, indices into `COMMANDS`; and `samples`, the held-out samples in the cell, of those
     in which the third sensor tells the teacher the same (lit or dark, near or not) as it does in the slice.
     """
-    space = program.space
-    cells = cell_readings(space.schema, bins)
+    space, teacher = program.space, sim.Teacher()
     row, column = (index.ravel() for index in np.indices((bins, bins)))
     probe = torch.zeros(1, 3, dtype=torch.float64)
     probe[0, plane.third] = plane.fixed
-    readings = np.empty((bins * bins, 3))
-    readings[:, plane.x], readings[:, plane.y] = cells[plane.x, column], cells[plane.y, row]
-    readings[:, plane.third] = cells[plane.third, int(space.cells(probe)[0, plane.third])]
-    same = _sensed(held_out.sensors.numpy(), plane.third) == _sensed(readings[:1], plane.third)
+    cells = np.empty((bins * bins, 3), dtype=np.int64)
+    cells[:, plane.x], cells[:, plane.y], cells[:, plane.third] = column, row, int(space.cells(probe)[0, plane.third])
+    low, high = np.array([(sensor.low, sensor.high) for sensor in sim.SENSORS]).T
+    readings = np.where(cells == bins - 1, high, low + (high - low) * (cells + 0.5) / bins)
+
+    below = teacher.obstacle_below if plane.third == DISTANCE else teacher.light_below
+    held = held_out.sensors.numpy()[:, plane.third]
+    same = (held < below) == (readings[0, plane.third] < below)
     sampled = space.cells(held_out.sensors).numpy()[same]
     samples = np.bincount(sampled[:, plane.y] * bins + sampled[:, plane.x], minlength=bins * bins)
     return pd.DataFrame(
@@ -93,15 +88,25 @@ def command_map(program: Behaviour | Policy, bins: int, plane: Slice, held_out: 
             "slice": plane.title,
             "row": row,
             "column": column,
-            **{sensor.name: readings[:, place] for place, sensor in enumerate(space.schema.sensors)},
+            **{sensor.name: readings[:, place] for place, sensor in enumerate(sim.SENSORS)},
             "learned": kinds(program(readings).commands.numpy()),
-            "teacher": kinds(sim.Teacher()(readings)),
+            "teacher": kinds(teacher(readings)),
             "samples": samples,
         }
     )
 
 
-def _sensed(readings: NDArray[np.float64], sensor: int) -> NDArray[np.bool_]:
-    """Whether the teacher senses something with this sensor."""
-    teacher = sim.Teacher()
-    return readings[:, sensor] < (teacher.obstacle_below if sensor == DISTANCE else teacher.light_below)
+@torch.no_grad()
+def ambiguous_share(program: Behaviour | Policy, train: Demonstrations, held_out: Demonstrations) -> float | None:
+    """Of the held-out samples with another command than the teacher's, the share that no program could get right.
+
+    Those are the samples whose condition the teacher answers with several commands, in `train` and `held_out` taken
+    together: its threshold runs through their bin. None if there are no differences.
+    """
+    both = Demonstrations.join([train, held_out])
+    frame = pd.DataFrame({"condition": distinct_rows(program.space.cells(both.sensors))[1].numpy()})
+    frame["wanted"], frame["given"] = kinds(both.commands.numpy()), kinds(program(both.sensors).commands.numpy())
+    frame["ambiguous"] = frame.groupby("condition").wanted.transform("nunique") > 1
+    held = frame.iloc[len(train) :]
+    differs = held.loc[held.wanted != held.given]
+    return None if differs.empty else float(differs.ambiguous.mean())

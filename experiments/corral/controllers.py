@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,28 +23,30 @@ if TYPE_CHECKING:
     from experiments.corral.settings import Corral
 
 MANY_STARTS = ("teacher", "default", "bundled")
-"""The rows that drive `starts` episodes; the wheeled teacher drives `wheeled_starts`, all others `other_starts`."""
+"""The rows that drive `starts` episodes; those on wheels drive `wheeled_starts`, all others `other_starts`."""
+TWINS = {"bullet": "planar", "wheeled": "wheeled"}
+"""Endings of rows that repeat another row in the physics engine, with the robot's body there."""
 
 
 @dataclass(frozen=True)
-class Task:
-    """What a controller learns from, and how it is tried before it is chosen.
+class Material:
+    """What all controllers learn from and are compared with.
 
     Attributes:
         settings: of the run.
+        folder: where trajectories, maps and programs are kept for the page.
         train: all demonstrated samples.
+        moving: those before the lamp was reached; all of a file, which does not say when that was.
         bank: what was learned over the codebooks of the run, see `learn`.
+        examined: the teacher from the held-out starts.
     """
 
     settings: Corral
+    folder: Path
     train: Demonstrations
+    moving: Demonstrations
     bank: BehaviourBank
-
-    def validate(self, policy: sim.ControllerLike) -> float:
-        """The success of a candidate from starts that are neither demonstrated nor held out."""
-        episodes = range(corral.FIRST_VALIDATION, corral.FIRST_VALIDATION + self.settings.validation_starts)
-        rollout = corral.drive(self.settings, policy, episodes, corral.arena(self.settings.arena))
-        return rollout.summary().success_rate
+    examined: sim.Rollout
 
 
 @dataclass(frozen=True)
@@ -53,14 +56,12 @@ class Controller:
     Attributes:
         policy: what drives.
         pairs: in its program.
-        body: the robot's body, if not that of the run.
         reports: what its learning rule did, by behaviour.
         candidates: what was compared to choose its settings, a row for each.
     """
 
     policy: sim.ControllerLike
     pairs: int | None = None
-    body: str | None = None
     reports: dict[str, LearningReport] = field(default_factory=dict)
     candidates: list[dict[str, float]] = field(default_factory=list)
 
@@ -70,24 +71,9 @@ class Controller:
         return self.policy if isinstance(self.policy, Behaviour | Policy) else None
 
     @property
-    def space(self) -> Space | None:
-        """The codebooks of its program, if it has one."""
-        return None if self.program is None else self.program.space
-
-    @property
     def bins(self) -> int | None:
         """Bins per sensor, if readings are binned."""
-        return None if self.space is None else bins_of(self.space)
-
-    @property
-    def bank(self) -> BehaviourBank | None:
-        """What it learned over codebooks of its own, if it did."""
-        if not isinstance(self.policy, Behaviour):
-            return None
-        bank = BehaviourBank(self.policy.space)
-        for name in self.reports:
-            bank.add(name, self.policy)
-        return bank
+        return None if self.program is None else bins_of(self.program.space)
 
 
 def bins_of(space: Space) -> int | None:
@@ -95,23 +81,34 @@ def bins_of(space: Space) -> int | None:
     return getattr(space.encoder, "bins", None) if space.encoder.discrete else None
 
 
+def original(name: str) -> str:
+    """The row that a row repeats in the physics engine, `teacher` for `teacher_wheeled`; else the row itself."""
+    first, _, ending = name.rpartition("_")
+    return first if ending in TWINS else name
+
+
+def driving(settings: Corral, name: str) -> Corral:
+    """The settings of the run with the engine and the body of a row."""
+    body = TWINS.get(name.rpartition("_")[2])
+    return settings if body is None else replace(settings, engine="bullet", body=body, robots=None)
+
+
 def starts(settings: Corral, name: str) -> int:
     """How many held-out starts a row drives."""
-    if name == "teacher_wheeled":
+    if name.endswith("_wheeled"):
         return settings.wheeled_starts
     return settings.starts if name in MANY_STARTS else settings.other_starts
 
 
-def learn(settings: Corral, train: Demonstrations, learned: Callable[[str], object]) -> BehaviourBank:
+def learn(settings: Corral, train: Demonstrations) -> BehaviourBank:
     """Learn what the rows `default` and `bundled` need, with the rule and the codebooks of the run.
 
     `default` is shown everything; the behaviours of `bundled` are learned apart, each where its own rules of the
-    teacher fire. `learned` is called with the name of each behaviour.
+    teacher fire.
     """
     bank, rule = BehaviourBank(corral.space(settings)), parts.rule(settings.rule)
-    if "default" in settings.controllers:
+    if "default" in map(original, settings.controllers):
         bank.learn("default", train, rule)
-        learned("default")
     if "bundled" in settings.controllers:
         fires = sim.Teacher().rule(train.sensors.numpy())
         for name, rules in sim.BEHAVIOURS.items():
@@ -119,7 +116,6 @@ def learn(settings: Corral, train: Demonstrations, learned: Callable[[str], obje
             if not chosen.any():
                 raise ValueError(f"no demonstration shows {name!r}; give it more of them (demonstrations=...)")
             bank.learn(name, train.where(chosen), rule)
-            learned(name)
     return bank
 
 
@@ -133,66 +129,67 @@ def printed_space(settings: Corral, bins: int | None = None, protection: parts.O
     return parts.space(corral.schema(), settings.vsa, encoder, printed.record, chosen, settings.seed)
 
 
-def paper(task: Task, bins: int | None = None, name: str = "paper") -> Controller:
-    """The printed algorithms read literally, at the bins of `default` or others."""
-    rule = parts.rule(task.settings.paper.rule)
-    return one_program(name, rule.fit(printed_space(task.settings, bins), task.train))
-
-
-def paper_best_bins(task: Task) -> Controller:
-    """The same at the bins with the highest success on validation starts (then agreement; then the fewest)."""
-    at_hand = printed_space(task.settings)
-    choices = sorted({*task.settings.paper_bins, bins_of(at_hand) or 0} - {0})
-    programs = [paper(task, bins, "paper_best_bins") for bins in choices]
-    candidates = [
-        {
-            "bins": bins,
-            "validation_success": task.validate(program.policy),
-            "train_agreement": share_right(program.policy, task.train),
-        }
-        for bins, program in zip(choices, programs, strict=True)
-    ]
-    order = [(row["validation_success"], row["train_agreement"]) for row in candidates]
-    best = programs[order.index(max(order))]
-    return Controller(best.policy, best.pairs, reports=best.reports, candidates=candidates)
-
-
-def bundled(task: Task) -> Controller:
-    """Three behaviours that were learned apart, combined without any further training."""
-    bank = BehaviourBank(task.bank.space)
-    for name in sim.BEHAVIOURS:
-        bank.add(name, task.bank[name])
-    reports = {name: bank[name].report for name in bank}
-    pairs = sum(report.pairs for report in reports.values())
-    return Controller(parts.policy(bank, task.settings.composition), pairs, reports=reports)
-
-
-def written_by_hand(task: Task) -> Controller:
-    """The teacher's rules as one hypervector, without learning."""
-    vsa = torchvsa.architecture(**task.settings.vsa)
-    return one_program("hand_written", hand_written.behaviour(vsa, task.settings.seed))
-
-
-def classifier(name: str, task: Task) -> Classified:
-    """One of scikit-learn's classifiers."""
-    return Classified(CLASSIFIERS[name](task.settings.seed), task.train)
-
-
 def one_program(name: str, behaviour: Behaviour) -> Controller:
     """A behaviour that drives by itself."""
     return Controller(behaviour, behaviour.report.pairs, reports={name: behaviour.report})
 
 
-CONTROLLERS: dict[str, Callable[[Task], Controller]] = {
-    "teacher": lambda task: Controller(sim.Teacher()),
-    "default": lambda task: one_program("default", task.bank["default"]),
+def paper(material: Material, bins: int | None = None, name: str = "paper") -> Controller:
+    """The printed algorithms read literally, at the bins of `default` or others."""
+    rule = parts.rule(material.settings.paper.rule)
+    return one_program(name, rule.fit(printed_space(material.settings, bins), material.train))
+
+
+def paper_best_bins(material: Material) -> Controller:
+    """The same at the bins with the highest success on validation starts (then agreement; then the fewest).
+
+    The validation starts are neither demonstrated nor held out.
+    """
+    settings = material.settings
+    episodes = range(corral.FIRST_VALIDATION, corral.FIRST_VALIDATION + settings.validation_starts)
+    at_hand = bins_of(printed_space(settings))
+    programs, candidates = [], []
+    for bins in sorted({*settings.paper_bins, at_hand or 0} - {0}):
+        program = paper(material, bins, "paper_best_bins")
+        rollout = corral.drive(settings, program.policy, episodes, corral.arena(settings.arena))
+        success, agreement = float(rollout.success.mean()), share_right(program.policy, material.train)
+        programs.append(program)
+        candidates.append({"bins": bins, "validation_success": success, "train_agreement": agreement})
+    order = [(row["validation_success"], row["train_agreement"]) for row in candidates]
+    return replace(programs[order.index(max(order))], candidates=candidates)
+
+
+def bundled(material: Material) -> Controller:
+    """Three behaviours that were learned apart, combined without any further training."""
+    bank = BehaviourBank(material.bank.space)
+    for name in sim.BEHAVIOURS:
+        bank.add(name, material.bank[name])
+    reports = {name: bank[name].report for name in bank}
+    pairs = sum(report.pairs for report in reports.values())
+    return Controller(parts.policy(bank, material.settings.composition), pairs, reports=reports)
+
+
+def written_by_hand(material: Material) -> Controller:
+    """The teacher's rules as one hypervector, without learning."""
+    vsa = torchvsa.architecture(**material.settings.vsa)
+    return one_program("hand_written", hand_written.behaviour(vsa, material.settings.seed))
+
+
+def classifier(name: str, material: Material) -> Classified:
+    """One of scikit-learn's classifiers."""
+    return Classified(CLASSIFIERS[name](material.settings.seed), material.train)
+
+
+CONTROLLERS: dict[str, Callable[[Material], Controller]] = {
+    "teacher": lambda material: Controller(sim.Teacher()),
+    "default": lambda material: one_program("default", material.bank["default"]),
     "paper": paper,
     "paper_best_bins": paper_best_bins,
     "bundled": bundled,
     "hand_written": written_by_hand,
-    "nearest_neighbour": lambda task: Controller(classifier("nearest_neighbour", task), pairs=len(task.train)),
-    "decision_tree": lambda task: Controller(classifier("decision_tree", task)),
-    "random": lambda task: Controller(RandomCommands(task.settings.seed)),
-    "teacher_wheeled": lambda task: Controller(sim.Teacher(), body="wheeled"),
+    "nearest_neighbour": lambda material: Controller(classifier("nearest_neighbour", material), len(material.train)),
+    "decision_tree": lambda material: Controller(classifier("decision_tree", material)),
+    "random": lambda material: Controller(RandomCommands(material.settings.seed)),
 }
+CONTROLLERS |= {f"{name}_{twin}": CONTROLLERS[name] for twin in TWINS for name in ("teacher", "default")}
 """All rows by name; each is made from what it may learn from."""

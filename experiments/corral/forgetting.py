@@ -52,28 +52,22 @@ def recalled(rules: Mapping[str, tuple[Space, Rule]], shown: Demonstrations) -> 
     it; its `result`, a number for each command; and for each learner whether its program answers with that command. In
     all rows `conditions` is the number of distinct conditions shown, those with several commands included.
     """
-    first = next(iter(rules.values()))[0]
-    cells = first.cells(shown.sensors)
-    conditions, which = distinct_rows(cells)
-    results, result = distinct_rows(first.schema.command_levels(shown.commands))
-    pairs = torch.stack([which, result], 1).unique(dim=0)
-    single = torch.bincount(pairs[:, 0], minlength=len(conditions)) == 1
-    wanted = torch.zeros(len(conditions), dtype=torch.int64)
-    wanted[pairs[:, 0]] = pairs[:, 1]
-    age = len(conditions) - 1 - torch.arange(len(conditions))
-    frame = pd.DataFrame({"age": age[single].numpy(), "result": wanted[single].numpy()})
-    frame["conditions"] = len(conditions)
-    if frame.empty:
-        return frame.assign(**dict.fromkeys(rules, False))
-    # Each learner asks by its own codes, with readings of the condition.
-    sample = torch.full((len(conditions),), len(which)).scatter_reduce(0, which, torch.arange(len(which)), "amin")
-    readings = shown.sensors[sample[single]]
+    space = next(iter(rules.values()))[0]
+    results, result = distinct_rows(space.schema.command_levels(shown.commands))
+    samples = pd.DataFrame(
+        {"condition": distinct_rows(space.cells(shown.sensors))[1].numpy(), "result": result.numpy()}
+    )
+    samples["single"] = samples.groupby("condition").result.transform("nunique") == 1
+    first = samples.drop_duplicates("condition")
+    asked = first.loc[first.single]
+    frame = pd.DataFrame({"age": len(first) - 1 - asked.condition, "result": asked.result, "conditions": len(first)})
     for name, (space, rule) in rules.items():
         with no_convergence_warnings():  # the recall says it
             behaviour = rule.fit(space, shown)
-        match = space.schema.command_levels(behaviour(readings).commands) == results[wanted[single]]
-        frame[name] = match.all(-1).numpy()
-    return frame
+        # Each learner asks by its own codes, with readings of the condition.
+        levels = space.schema.command_levels(behaviour(shown.sensors[asked.index.tolist()]).commands)
+        frame[name] = (levels == results[asked.result.tolist()]).all(-1).numpy()
+    return frame.reset_index(drop=True)
 
 
 def most_frequent(recall: pd.DataFrame) -> float:
@@ -87,6 +81,6 @@ def by_age(recall: pd.DataFrame, learner: str, groups: int = 10) -> pd.DataFrame
     Groups of fewer than eight conditions would show chance more than age, so few conditions make few groups.
     """
     groups = max(1, min(groups, len(recall) // 8))
-    parts = [np.array_split(recall[column].to_numpy(), groups) for column in ("age", learner)]
-    age, share = ([float(part.mean()) for part in column] for column in parts)
+    columns = [np.array_split(recall[column].to_numpy(), groups) for column in ("age", learner)]
+    age, share = ([float(chunk.mean()) for chunk in chunks] for chunks in columns)
     return pd.DataFrame({"learner": learner, "age": age, "recall": share})

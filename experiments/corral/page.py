@@ -3,26 +3,23 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import pandas as pd
 
 import sim
-from experiments.corral import figures, tables, text
-from experiments.corral.forgetting import ABOUT
-from experiments.corral.map_figure import command_maps
-from experiments.corral.timeline_figure import timelines
-from experiments.corral.trajectories import as_rollout, representative_episode, timeline
-from experiments.kit import Outcome, Page, Row, Study
-from experiments.tasks import corral
+from experiments.corral import figures, tables
+from experiments.corral.forgetting import ABOUT, CLIPPED, by_age
+from experiments.corral.trajectories import as_rollout, driven_episodes, representative_episode
+from experiments.kit import Outcome, Page, Study
 from sim import render
 
 DRAWN = ("teacher", "default", "bundled", "paper", "paper_best_bins", "hand_written", "random")
 """Controllers whose trajectories are drawn."""
 PROGRAMS = ("default", "bundled", "paper", "paper_best_bins", "hand_written")
 """Programs to look into: the first two that the run has."""
-REFERENCES = ("teacher", "teacher_wheeled", "random")
+REFERENCES = ("teacher", "teacher_bullet", "teacher_wheeled", "random")
 """Controllers whose failures say nothing about learning."""
 
 
@@ -32,200 +29,199 @@ class Run:
 
     outcome: Outcome
 
-    @property
-    def names(self) -> list[str]:
-        """The controllers."""
-        return self.outcome.settings.controllers
+    def those(self, names: Sequence[str]) -> list[str]:
+        """Those of the names that are controllers of the run."""
+        return [name for name in names if name in self.outcome.settings.controllers]
 
     @property
     def programs(self) -> list[str]:
         """The programs to look into, at most two."""
-        return [name for name in PROGRAMS if name in self.names][:2]
-
-    @functools.cached_property
-    def measured(self) -> dict[str, Row]:
-        """The numbers of each controller."""
-        return tables.by_controller(self.outcome.records)
+        return self.those(PROGRAMS)[:2]
 
     @functools.cached_property
     def episodes(self) -> pd.DataFrame:
         """All driven episodes."""
-        return tables.episodes_of(self.outcome.records)
+        return driven_episodes(self.outcome.records)
 
     @functools.cached_property
     def episode(self) -> int | None:
         """The held-out start that the animation and the timelines show."""
-        names = [name for name in ("teacher", *self.programs) if name in self.names]
-        return representative_episode(self.episodes, names)
+        return representative_episode(self.episodes, [*self.those(["teacher"]), *self.programs])
 
-    def kept(self, kind: str, name: str) -> pd.DataFrame | None:
-        """What a controller's cell kept for the page, if it did."""
-        path = self.outcome.folder / kind / f"{name}.parquet"
-        return pd.read_parquet(path) if path.is_file() else None
+    def kept(self, kind: str, names: Sequence[str]) -> dict[str, pd.DataFrame]:
+        """What the cells of some controllers kept for the page, of those that did."""
+        paths = {name: self.outcome.folder / kind / f"{name}.parquet" for name in self.those(names)}
+        return {name: pd.read_parquet(path) for name, path in paths.items() if path.is_file()}
 
-    def rollout(self, name: str) -> sim.Rollout | None:
-        """The kept starts of a controller."""
-        steps, settings = self.kept("trajectories", name), self.outcome.settings
-        if steps is None:
-            return None
-        episodes = self.episodes.loc[self.episodes.controller == name]
-        return as_rollout(steps, episodes, corral.arena(settings.arena), settings.seed, settings.seconds)
+    def rollouts(self, names: Sequence[str]) -> dict[str, sim.Rollout]:
+        """The kept starts of some controllers."""
+        return {
+            name: as_rollout(steps, self.episodes.loc[self.episodes.controller == name], self.outcome.settings)
+            for name, steps in self.kept("trajectories", names).items()
+        }
+
+
+def headline(outcome: Outcome) -> str:
+    """From how many starts the robot reaches the lamp."""
+    reached = {
+        row["controller"]: f"{row['success_rate'] * row['episodes']:,.0f} of {row['episodes']:,} starts"
+        for row in outcome.table
+    }
+    if "default" not in reached:
+        return f"The robot reaches the lamp: {', '.join(f'`{name}` from {count}' for name, count in reached.items())}."
+    others = [f"; `{name}` from {reached[name]}" for name in ("teacher", "paper") if name in reached]
+    dim = outcome.config["vsa"]["dim"]
+    return (
+        f"One hypervector of {dim:,} numbers drives the robot to the lamp from {reached['default']} that it never "
+        f"saw{''.join(others)}."
+    )
 
 
 def page(page: Page, outcome: Outcome, study: Study) -> None:
     """Fill the page with all that the run has something to show for."""
     run = Run(outcome)
-    for add in (_what, _table, _success, _corral, _animation, _maps, _timelines, _printed, _where_it_fails, _bodies):
+    for add in (_table, _corral, _maps, _timelines, _printed, _failures):
         add(run, page)
 
 
-def _what(run: Run, page: Page) -> None:
-    section = page.section("What was run")
-    section.text(text.lead(run.outcome))
-    section.table(tables.SETTINGS.show(tables.settings(run.outcome)))
-
-
 def _table(run: Run, page: Page) -> None:
+    outcome, config = run.outcome, run.outcome.config
     section = page.section("The table")
-    section.table(tables.MAIN.show(run.outcome.table))
-    section.text(tables.AGREEMENT)
-    section.table(tables.AGREEMENTS.show(_rows(run, run.names)))
-
-
-def _success(run: Run, page: Page) -> None:
-    page.section("Success").figure(
+    section.text(
+        "A simulated robot leaves a corral and finds a lamp. Each controller learns from runs of a teacher with five "
+        "rules, or is a reference point, and then drives by itself from starts that it was never shown. `default` is "
+        f"one hypervector: `{config['encoder']['name']}` codes of the readings, joined by `{config['record']['name']}` "
+        f"and learned by `{config['rule']['name']}`. All settings are at the end of the page."
+    )
+    section.table(tables.MAIN.show(outcome.table))
+    section.figure(
         "success",
-        lambda: figures.success(run.outcome.table),
+        lambda: figures.success(outcome.table),
         "Success rate of each controller with its interval",
         "Dots: share of episodes that succeed. Bars: Wilson's 95 % interval, which is wide where episodes are few.",
-        pd.DataFrame(run.outcome.table),
+        pd.DataFrame(outcome.table),
     )
+    if any(row["minus_original"] is not None for row in outcome.table):
+        section.text(
+            f"Rows that end in `_bullet` and `_wheeled` repeat others in the physics engine: with the same body, and "
+            f"with wheels on a floor. All others are driven by the engine `{config['engine']}`."
+        )
+    section.table(tables.AGREEMENT.show(outcome.table))
 
 
 def _corral(run: Run, page: Page) -> None:
-    rollouts = {name: run.rollout(name) for name in DRAWN if name in run.names}
-    shown = {name: rollout for name, rollout in rollouts.items() if rollout is not None}
+    shown = run.rollouts(DRAWN)
     if not shown:
         return
     episodes = sorted(set.intersection(*(set(rollout.episode.tolist()) for rollout in shown.values())))
-    page.section("The corral from above").figure(
+    section = page.section("The corral from above")
+    section.figure(
         "trajectories",
         lambda: figures.trajectories(shown, episodes),
         "Trajectories of the controllers in the corral, seen from above",
         f"The same {len(episodes)} held-out starts for each controller, driven until success or for "
-        f"{run.outcome.settings.seconds:g} s. The walls leave one gap, and the lamp stands beyond it. Colours: the "
-        "behaviour that the readings call for.",
+        f"{run.outcome.settings.seconds:g} s. Colours: the behaviour that the readings call for.",
     )
-
-
-def _animation(run: Run, page: Page) -> None:
-    if not run.outcome.settings.animate or not run.programs or "teacher" not in run.names or run.episode is None:
-        return
-    names = ["teacher", run.programs[0]]
-    rollouts = [rollout for name in names if (rollout := run.rollout(name)) is not None]
-    path = render.animate(rollouts, names, run.outcome.folder / "rollout.gif", run.episode)
-    page.section("Teacher and learned robot, side by side").picture(
-        path.read_bytes(),
-        f"Animation of teacher and {names[1]} driving out of the corral",
-        text.ANIMATION.format(name=names[1], episode=run.episode),
-    )
+    names = [name for name in ("teacher", *run.programs[:1]) if name in shown]
+    if run.outcome.settings.animate and len(names) == 2 and run.episode is not None:
+        path = run.outcome.folder / "rollout.gif"
+        render.animate([shown[name] for name in names], names, path, run.episode)
+        section.picture(
+            path.read_bytes(),
+            f"Animation of teacher and {names[1]} driving out of the corral",
+            f"Teacher and `{names[1]}` from held-out start {run.episode}. Both begin in the same place with the same "
+            "wheel noise in store, and part as soon as one command differs.",
+        )
 
 
 def _maps(run: Run, page: Page) -> None:
-    found = {name: run.kept("maps", name) for name in run.programs if name != "hand_written"}
-    maps = {name: frame for name, frame in found.items() if frame is not None}
+    maps = run.kept("maps", [name for name in run.programs if name != "hand_written"])
     if not maps:
         return
-    section = page.section("Agreement over sensor space")
-    section.text(text.MAPS, *(text.map_summary(name, frame) for name, frame in maps.items()))
-    section.figure(
+    page.section("Agreement over sensor space").figure(
         "command_maps",
-        lambda: command_maps(maps),
+        lambda: figures.command_maps(maps),
         "Commands over sensor space of the teacher and the learned programs",
-        text.MAPS_CAPTION,
-        _joined(maps),
+        "Each small square is one condition: a bin of two sensors, while the third is held. Its colour is the command. "
+        "A program answers everywhere, also where nothing was ever demonstrated; dots: held-out samples in which the "
+        "third sensor tells the teacher the same as here. A hatched square without a dot was never met in them. Asked "
+        "at the middle of each bin; in the last bin at the end of the range, which is what a sensor reads where it "
+        "senses nothing. Dotted line: where the teacher begins to see an obstacle.",
+        pd.concat(maps, names=["controller"]).reset_index("controller"),
     )
 
 
 def _timelines(run: Run, page: Page) -> None:
-    steps = {name: run.kept("trajectories", name) for name in run.programs}
-    if run.episode is None or not steps:
+    kept = run.kept("trajectories", run.programs)
+    if run.episode is None or not kept:
         return
-    lines = {name: timeline(frame, run.episode) for name, frame in steps.items() if frame is not None}
-    section = page.section("Similarity and familiarity over time")
-    section.text(text.TIMELINES, *(text.timeline_summary(name, line) for name, line in lines.items()))
-    section.figure(
+    lines = {name: steps.loc[steps.episode == run.episode] for name, steps in kept.items()}
+    page.section("Similarity and familiarity over time").figure(
         "timelines",
-        lambda: timelines(lines),
+        lambda: figures.timelines(lines),
         "Readings, similarity, margin and familiarity over one episode",
-        text.TIMELINES_CAPTION,
-        _joined(lines),
+        "How sure a program is while it drives. Similarity: cosine of its noisy answer with the result that wins. "
+        "Margin: how far the next result lies below. Familiarity: cosine of the condition with the sum of those known; "
+        "low where a condition was rarely met or never. Background: the rule that the teacher would follow. Bottom: "
+        "red marks where the command differs from the teacher's, blue marks for the behaviour that spoke, where "
+        "several are combined.",
+        pd.concat(lines, names=["controller"]).reset_index("controller"),
     )
 
 
 def _printed(run: Run, page: Page) -> None:
-    names = [name for name in ("paper", "paper_best_bins") if name in run.names]
+    names = run.those(["paper", "paper_best_bins"])
     if not names:
         return
     section = page.section("Why the printed algorithm does what it does")
-    learned = {row["controller"]: row for row in tables.learning(run.outcome.records)}
-    counts = [learned[name] for name in names]
-    section.table(tables.COUNTS.show(counts))
-    section.text(*(text.counts_summary(row) for row in counts))
     records = run.outcome.records
-    candidates = records.loc[records.kind == "candidate"].to_dict(orient="records")
-    if candidates:
-        section.table(tables.CANDIDATES.show(candidates))
-    found = [run.kept("recall", name) for name in names]
-    panels = {int(frame.bins.iloc[0]): frame for frame in found if frame is not None and len(frame)}
+    learned = records.loc[(records.kind == "learning") & records.controller.isin(names)]
+    section.table(tables.COUNTS.show(learned.sort_values("controller").to_dict(orient="records")))
+    if "paper_best_bins" in names:
+        section.table(tables.CANDIDATES.show(records.loc[records.kind == "candidate"].to_dict(orient="records")))
+    panels = {int(frame.bins.iloc[0]): frame for frame in run.kept("recall", names).values() if len(frame)}
     if not panels:
         return
-    section.text(text.RECALL)
-    section.terms(ABOUT)
+    every = pd.concat(panels.values())
+    means = [panel[["bins", "conditions", *ABOUT]].mean() for panel in panels.values()]
+    section.table(tables.RECALL.show(pd.DataFrame(means).to_dict(orient="records")))
     section.figure(
         "recall_by_age",
         lambda: figures.recall_by_age(list(panels.values())),
         "Recall of demonstrated conditions by how many came after them",
-        text.RECALL_CAPTION,
-        pd.concat(panels.values()),
+        "The same conditions in groups of equal size. Dotted: the recall of a program that always answers with the "
+        "most frequent command.",
+        every,
     )
-    for panel in panels.values():
-        section.text(*text.recall_summary(panel, run.outcome.config["paper"]["rule"]))
+    reason = why_it_forgets(panels.values())
+    if reason and run.outcome.config["paper"]["rule"].get("clip_each_step"):
+        section.text(reason)
 
 
-def _where_it_fails(run: Run, page: Page) -> None:
-    names = [name for name in run.names if name not in REFERENCES]
+def why_it_forgets(panels: Iterable[pd.DataFrame]) -> str:
+    """Why clipping after each addition forgets, with the measured recall; empty where it does not."""
+    found = []
+    for recall in panels:
+        shares = by_age(recall, CLIPPED, 5).recall
+        newest, oldest = shares.iloc[-1], shares.iloc[0]
+        if newest - oldest > 0.05:
+            found.append(
+                f"{newest:.0%} of the newest fifth and {oldest:.0%} of the oldest at {recall.bins.iloc[0]} bins"
+            )
+    if not found:
+        return ""
+    return (
+        "Why it forgets: after a clip no element of the program is larger than that of one pair, however many pairs "
+        "agreed on it. So each new pair weighs as much as all the older ones together. Of the conditions, "
+        f"`{CLIPPED}` recalls {', '.join(found)}."
+    )
+
+
+def _failures(run: Run, page: Page) -> None:
+    names = [name for name in run.outcome.settings.controllers if name not in REFERENCES]
     if not names:
         return
     section = page.section("Where it fails")
-    rows = [{**row, "differs": 1 - row["heldout_agreement"]} for row in _rows(run, names)]
-    section.table(tables.RULES.show(rows))
-    section.text(*text.edge_summaries(rows))
-    failing = tables.failing(run.episodes, names)
-    if not any(row["failed"] for row in failing):
-        section.text("No episode of any of these controllers failed.")
-        return
-    section.table(tables.ENDS.show(failing))
+    section.table(tables.FAILURES.show(tables.failing(run.episodes, names)))
     if mistakes := tables.most_frequent_mistakes(run.outcome.records, names):
         section.table(tables.MISTAKES.show(mistakes))
-    section.text(text.failure_summary(failing))
-
-
-def _bodies(run: Run, page: Page) -> None:
-    both = ["teacher", "teacher_wheeled"]
-    if not set(both) <= set(run.names):
-        return
-    success = tables.shared_success(run.episodes, both)
-    bodies = {both[0]: run.outcome.settings.body, both[1]: "wheeled"}
-    section = page.section("Wheeled and planar body")
-    rows = [{"body": bodies[name], **corral.success(len(own), int(own.sum()))} for name, own in success.items()]
-    section.table(tables.BODIES.show(rows))
-    section.text(text.bodies_summary(run.episodes, bodies))
-
-
-def _rows(run: Run, names: Sequence[str]) -> list[Row]:
-    return [{"controller": name, **run.measured[name]} for name in names]
-
-
-def _joined(frames: dict[str, pd.DataFrame]) -> pd.DataFrame:
-    return pd.concat([frame.assign(controller=name) for name, frame in frames.items()])

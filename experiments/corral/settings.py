@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import sim
 from behaviours import BehaviourBank, Demonstrations, OneShot
-from experiments.corral.controllers import CONTROLLERS, printed_space
+from experiments.corral.controllers import CONTROLLERS, original, printed_space
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.models import hand_written
 from experiments.tasks import corral
@@ -32,7 +32,7 @@ class Corral(corral.Learning):
         None, "or a file of your own to learn from, as written by behaviours.Demonstrations.save"
     )
     starts: int = setting(1000, "held-out starts for teacher, default and bundled", low=1)
-    wheeled_starts: int = setting(500, "held-out starts for the teacher on the wheeled body", low=1)
+    wheeled_starts: int = setting(200, "held-out starts for the rows on the wheeled body", low=1)
     other_starts: int = setting(200, "held-out starts for every other controller", low=1)
     paper_bins: list[int] = setting(
         [2, 3, 4, 6, 8, 12, 16], "tried for paper_best_bins, and the bins of paper", low=1, distinct=True, empty=True
@@ -45,7 +45,7 @@ def check(settings: Corral) -> None:
     """Raise for settings with which something could not be built, learned or combined."""
     space, rule = corral.space(settings), parts.rule(settings.rule)
     corral.arena(settings.arena)
-    if {"default", "bundled"} & set(settings.controllers):
+    if {"default", "bundled"} & set(map(original, settings.controllers)):
         parts.refuse_unsupported(rule, space)
     if "bundled" in settings.controllers:
         bank = BehaviourBank(space)

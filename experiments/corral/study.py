@@ -11,14 +11,16 @@ of the teacher (agreement), and then drives by itself from held-out starts (succ
 
 import pandas as pd
 
-from experiments.corral import tables, text
+from experiments.corral import tables
+from experiments.corral.controllers import original
 from experiments.corral.measure import measure, prepare
-from experiments.corral.page import page
+from experiments.corral.page import headline, page
 from experiments.corral.settings import PRESETS, Corral, check
+from experiments.corral.trajectories import driven_episodes
 from experiments.kit import Cell, Row, Study, grid
 from experiments.kit.intervals import proportion
 
-SLOWEST = ("teacher_wheeled", "paper_best_bins", "bundled", "default", "paper")
+SLOWEST = ("default_wheeled", "teacher_wheeled", "default_bullet", "teacher_bullet", "paper_best_bins", "bundled", "default", "paper")
 
 
 def cells(settings: Corral) -> list[Cell]:
@@ -29,33 +31,26 @@ def cells(settings: Corral) -> list[Cell]:
 
 def summarise(settings: Corral, records: pd.DataFrame) -> list[Row]:
     """A row for each controller, with its success on the starts that all controllers of the table drove."""
-    measured, episodes = tables.by_controller(records), tables.episodes_of(records)
-    common = tables.shared_success(episodes, settings.controllers)
-    rows = []
+    rows, episodes = tables.measured(records), driven_episodes(records)
+    success = tables.shared_success(episodes, settings.controllers)
     for name in settings.controllers:
-        success = common[name]
-        shared = {"common_episodes": len(success), **proportion("common", int(success.sum()), len(success))}
-        numbers = measured[name] | shared
-        rows.append({"controller": name, **{column: numbers.get(column) for column in tables.NUMBERS}})
-    return rows
+        common = proportion("common", int(success[name].to_numpy().sum()), len(success))
+        rows[name] |= {"common_episodes": len(success), **common, "minus_original": None}
+        if original(name) != name and original(name) in settings.controllers:
+            twins = tables.shared_success(episodes, [name, original(name)]).to_numpy().mean(axis=0)
+            rows[name]["minus_original"] = float(twins[0] - twins[1])
+    return [rows[name] for name in settings.controllers]
 
 
-def metrics(settings: Corral, records: pd.DataFrame, table: list[Row]) -> dict[str, float | None]:
-    """What the table has no room for."""
-    measured = tables.by_controller(records)
-    found = {
-        f"{name}.{key}": value
-        for name in settings.controllers
-        for key, value in measured[name].items()
-        if key not in tables.NUMBERS
+def metrics(settings: Corral, records: pd.DataFrame, table: list[Row]) -> dict[str, float]:
+    """What learning did, beyond the numbers of the table."""
+    learned = records.loc[records.kind == "learning"].dropna(axis=1, how="all")
+    counts = learned.select_dtypes("number").columns
+    return {
+        f"{row['controller']}.learning.{row['behaviour']}.{count}": float(row[count])
+        for row in learned.to_dict(orient="records")
+        for count in counts
     }
-    for row in tables.learning(records):
-        counts = {key: float(value) for key, value in row.items() if isinstance(value, int)}
-        found |= {f"{row['controller']}.learning.{row['behaviour']}.{key}": value for key, value in counts.items()}
-    if {"teacher", "teacher_wheeled"} <= set(settings.controllers):
-        planar, wheeled = tables.shared_success(tables.episodes_of(records), ["teacher", "teacher_wheeled"]).values()
-        found["wheeled_minus_planar_success"] = float(wheeled.mean() - planar.mean())
-    return found
 
 
 study = Study(
@@ -70,7 +65,7 @@ study = Study(
     keys=("controller",),
     metrics=metrics,
     table=tables.MAIN,
-    headline=text.headline,
+    headline=headline,
     page=page,
     presets=PRESETS,
     objective="default.success_rate",

@@ -8,17 +8,18 @@ from typing import Any
 import pandas as pd
 
 import sim
-from experiments.corral.failures import PLACES
-from experiments.kit import Column, Outcome, Row, Table
-from experiments.kit.columns import number
+from experiments.corral.controllers import original
+from experiments.corral.forgetting import ABOUT
+from experiments.corral.trajectories import PLACES
+from experiments.kit import Column, Row, Table
 
-WHOLE = ("episodes", "common_episodes", "pairs_stored", "bins")
+WHOLE = ("episodes", "pairs_stored", "bins")
 """Numbers that are whole."""
 
 
 def is_learner(row: Mapping[str, Any]) -> bool:
-    """Whether a row competes; the teachers are what it is measured against."""
-    return not row["controller"].startswith("teacher")
+    """Whether a row competes; teachers are what it is measured against, and rows in the physics engine repeat others."""
+    return not row["controller"].startswith("teacher") and original(row["controller"]) == row["controller"]
 
 
 def agreement(key: str, label: str, about: str) -> Column:
@@ -42,6 +43,10 @@ MAIN = Table(
         Column(
             "common_rate", "common", ".3f", best="max", among=is_learner,
             about="success on the starts that all controllers of this table drove, on which they can be compared",
+        ),
+        Column(
+            "minus_original", "difference", "+.3f",
+            about="success minus that of the row which it repeats in the physics engine, on the starts that both drove",
         ),
         Column("escape_rate", "escape", about="share of episodes in which the robot leaves the corral at any time"),
         Column(
@@ -77,55 +82,48 @@ MAIN = Table(
     ],
     "Green: the best of its column, without the teachers, and only where all were measured on the same starts: success "
     "is compared in the column `common`, times only if all drove as many starts. Orange: less than half of the "
-    "episodes succeed.",
+    "episodes succeed. Agreement: share of samples for which the controller commands what the teacher did, without "
+    "those after the lamp was reached, since a robot at rest repeats one condition and would flatter every learner.",
 )  # fmt: skip
-AGREEMENT = (
-    "Agreement: share of samples for which the controller commands what the teacher did. Left out everywhere: samples "
-    "after the lamp was reached, since a robot at rest repeats one condition and would flatter every learner."
-)
-NUMBERS = (
-    "episodes",
-    *("success_rate", "success_low", "success_high"),
-    *("common_episodes", "common_rate", "common_low", "common_high"),
-    *("escape_rate", "time_to_light_s", "dwell_fraction", "collision_fraction"),
-    *("train_agreement", "heldout_agreement", "unseen_agreement"),
-    *("pairs_stored", "bins", "query_us"),
-)
-"""The numbers of a row, in order."""
+NUMBERS = [key for column in MAIN.columns[1:] for key in (column.key, *(column.interval or ()))]
+"""The numbers that are shown of every controller; those that do not apply to it are None."""
 
-EPISODE = {
-    **dict.fromkeys(("controller", "body"), "object"),
-    "episode": "int64",
-    **dict.fromkeys(("success", "escaped"), "bool"),
-    "time_to_light_s": "float64",
-    "steps": "int64",
-    **dict.fromkeys(("dwell_fraction", "collision_fraction", "start_x", "start_y", "start_heading"), "float64"),
-    "end": "object",
-    **dict.fromkeys(("steps_unlike_teacher", "behaviours_called"), "int64"),
-}
-"""The columns of an episode, and their types."""
-
-AGREEMENTS = Table(
-    "Agreement, counted in other ways",
+AGREEMENT = Table(
+    "Agreement in detail",
     [
         Column("controller"),
-        Column("heldout_agreement", "held out, per sample"),
-        Column("heldout_agreement_distinct", "held out, per condition"),
-        Column("unseen_share"),
-        Column("train_agreement_all", "all demonstrated samples"),
+        Column("train_agreement_all", "train, all", about="contradicting demonstrations included"),
+        Column(
+            "heldout_agreement_distinct", "per condition",
+            about="held out; each distinct condition counts once, at the bins of `default` for all controllers",
+        ),
+        *(
+            Column(f"heldout_agreement.{rule}", rule.replace("_", " "), bad=lambda share: share < 0.5)
+            for rule in sim.TEACHER_RULES
+        ),
+        Column(
+            "ambiguous_share", "on the edge",
+            about="of the held-out samples with another command than the teacher's, the share in bins in which the "
+            "teacher itself gives several commands, since its threshold runs through the bin: no program that sees "
+            "only bins can always be right there",
+        ),
+        Column("unseen_share", about="held-out samples whose condition was never demonstrated"),
     ],
-    "Agreement, counted in other ways. Per condition: each distinct held-out condition counts once, however often it "
-    "was met, at the bins of `default` for all. Unseen share: how many held-out samples have a condition that was "
-    "never demonstrated. All demonstrated samples: contradictions included, in which no program can always be right.",
-)
-COUNTED = ("samples", "new", "re_added", "truly_known", "falsely_known", "contradicting")
-COUNTS_OF_LEARNING = (*COUNTED, "epochs", "updates", "wrong", "presumed_known")
+    "The same agreement, counted in other ways; by rule: held out, where each of the teacher's rules fires. Orange: "
+    "less than half.",
+)  # fmt: skip
 COUNTS = Table(
     "What the printed algorithm decided",
-    [Column("controller"), *(Column(key, "re-added" if key == "re_added" else "") for key in COUNTED)],
-    "What the algorithm decided about the demonstrated samples, in the order in which it met them. New: stored for "
-    "the first time. Re-added: stored again, as the memory no longer resembled it. Truly known: skipped, and stored "
-    "before. Falsely known: skipped although never stored. Contradicting: stored before with another command.",
+    [
+        Column("controller"),
+        Column("samples", format=",.0f"),
+        Column("new", format=",.0f", about="stored for the first time"),
+        Column("re_added", "re-added", ",.0f", about="stored again, as the memory no longer resembled it"),
+        Column("truly_known", format=",.0f", about="skipped, and stored before"),
+        Column("falsely_known", format=",.0f", about="skipped although never stored: what it showed was lost"),
+        Column("contradicting", format=",.0f", about="stored before with another command"),
+    ],
+    "What the algorithm decided about the demonstrated samples, in the order in which it met them.",
 )
 CANDIDATES = Table(
     "Bins of paper_best_bins",
@@ -136,32 +134,34 @@ CANDIDATES = Table(
     ],
     "How the bins of `paper_best_bins` were chosen.",
 )
-RULES = Table(
-    "Agreement by the teacher's rule",
+RECALL = Table(
+    "Recall of the demonstrated conditions",
     [
-        Column("controller"),
-        *(
-            Column(f"heldout_agreement.{rule}", rule.replace("_", " "), bad=lambda share: share < 0.5)
-            for rule in sim.TEACHER_RULES
+        Column("bins", format=".0f"),
+        Column(
+            "conditions",
+            format=",.0f",
+            about="distinct conditions; asked are those that were shown with one command only",
         ),
-        Column("differs"),
-        Column("ambiguous_share", "on the edge"),
+        *(Column(learner, about=about) for learner, about in ABOUT.items()),
     ],
-    "Held-out agreement where each of the teacher's rules fires. Differs: share of held-out samples with another "
-    "command than the teacher's. On the edge: of those, the share in bins in which the teacher itself gives several "
-    "commands, since its threshold runs through the bin: no program that sees only bins can always be right there.",
+    "What each step of the algorithm costs: the same demonstrations, learned in five ways, and the share of conditions "
+    "for which the program then recalls the command.",
 )
-ENDS = Table(
+FAILURES = Table(
     "Failing episodes",
     [
         Column("controller"),
         Column("failed"),
         Column("of"),
         *(Column(place) for place in PLACES),
-        Column("unlike_teacher", "steps unlike the teacher's"),
+        Column(
+            "unlike_teacher", "steps unlike the teacher's",
+            about="0 where every command was the teacher's: bad luck of start and noise",
+        ),
     ],
     "Failing episodes, and where the robot was when the time was up.",
-)
+)  # fmt: skip
 MISTAKES = Table(
     "Commands in failing episodes that are not the teacher's",
     [
@@ -169,91 +169,43 @@ MISTAKES = Table(
         Column("rule", "where the teacher would", lambda row: row["rule"].replace("_", " ")),
         Column("command", "it commands"),
         Column("share", "share of steps"),
-        Column("readings", "readings (m)"),
+        Column(
+            "readings", "readings (m)", lambda row: ", ".join(f"{row[sensor.name]:.2f}" for sensor in sim.SENSORS)
+        ),
     ],
     "The commands that differ from the teacher's most often in the failing episodes: share of their control steps, and "
     "the median readings (left light, right light, distance) at which they were given.",
     words=True,
-)
-BODIES = Table(
-    "Bodies",
-    [
-        Column("body"),
-        Column("episodes"),
-        Column("success_rate", "success [95 %]", ".3f", ("success_low", "success_high")),
-    ],
-)
-SETTINGS = Table("What was run", [Column("setting"), Column("value")], words=True)
+)  # fmt: skip
 
 
-def by_controller(records: pd.DataFrame) -> dict[str, Row]:
-    """The numbers that were measured of each controller, without those that do not apply to it."""
+def measured(records: pd.DataFrame) -> dict[str, Row]:
+    """The numbers that were measured of each controller; other than those of the main table, only if they apply."""
     found = {}
-    for row in records.loc[records.kind == "controller"].to_dict(orient="records"):
-        known = {
-            str(key): value for key, value in row.items() if not pd.isna(value) and key not in ("kind", "controller")
-        }
-        found[row["controller"]] = known | {key: int(known[key]) for key in WHOLE if key in known}
+    for row in records.loc[records.kind == "controller"].drop(columns="kind").to_dict(orient="records"):
+        known = {str(key): int(value) if key in WHOLE else value for key, value in row.items() if pd.notna(value)}
+        found[row["controller"]] = {"controller": row["controller"], **dict.fromkeys(NUMBERS), **known}
     return found
 
 
-def learning(records: pd.DataFrame) -> list[Row]:
-    """What a learning rule did, for each behaviour of each controller."""
-    rows = records.loc[records.kind == "learning"].reindex(columns=["controller", "behaviour", *COUNTS_OF_LEARNING])
-    return rows.astype(dict.fromkeys(COUNTS_OF_LEARNING, int)).to_dict(orient="records")
-
-
-def episodes_of(records: pd.DataFrame) -> pd.DataFrame:
-    """The driven episodes, with the types that a frame with other rows in it loses."""
-    return records.loc[records.kind == "episode", list(EPISODE)].astype(EPISODE)
-
-
-def shared_success(episodes: pd.DataFrame, names: Sequence[str]) -> dict[str, pd.Series]:
-    """The success of each of these controllers on the starts that all of them drove."""
-    chosen = {name: episodes.loc[episodes.controller == name].set_index("episode").success for name in names}
-    shared = set.intersection(*(set(success.index) for success in chosen.values()))
-    return {name: success[success.index.isin(shared)] for name, success in chosen.items()}
+def shared_success(episodes: pd.DataFrame, names: Sequence[str]) -> pd.DataFrame:
+    """Success on the starts that all of these controllers drove: a row per start, a column per controller."""
+    success = episodes.pivot(index="episode", columns="controller", values="success")
+    return success.loc[:, list(names)].dropna().astype(bool)
 
 
 def failing(episodes: pd.DataFrame, names: Sequence[str]) -> list[Row]:
     """For each controller, how many episodes failed, where their robots ended, and the steps unlike the teacher's."""
-    rows = []
-    for name in names:
-        driven = episodes.loc[episodes.controller == name]
-        failed = driven.loc[~driven.success]
-        wrong = failed.steps_unlike_teacher.sum() / failed.steps.sum() if len(failed) else None
-        ends = {place: int((failed.end == place).sum()) for place in PLACES}
-        rows.append({"controller": name, "failed": len(failed), "of": len(driven), **ends, "unlike_teacher": wrong})
-    return rows
+    failed = episodes.loc[~episodes.success]
+    table = pd.crosstab(failed.controller, failed.end).reindex(index=names, columns=list(PLACES), fill_value=0)
+    steps = failed.groupby("controller")[["steps_unlike_teacher", "steps"]].sum()
+    table["failed"], table["of"] = table.sum(axis=1), episodes.controller.value_counts()
+    table["unlike_teacher"] = steps.steps_unlike_teacher / steps.steps
+    return table.rename_axis("controller").reset_index().to_dict(orient="records")
 
 
 def most_frequent_mistakes(records: pd.DataFrame, names: Sequence[str], most: int = 3) -> list[Row]:
     """The most frequent differences of each controller that fails."""
     rows = records.loc[(records.kind == "mistake") & records.controller.isin(names)].groupby("controller").head(most)
-    return [
-        {**row, "readings": ", ".join(f"{row[sensor.name]:.2f}" for sensor in sim.SENSORS)}
-        for name in names
-        for row in rows.loc[rows.controller == name].to_dict(orient="records")
-    ]
-
-
-def settings(outcome: Outcome) -> list[Row]:
-    """The settings that matter, in words."""
-    config = outcome.config
-    encoder, printed, vsa = config["encoder"], config["paper"], config["vsa"]
-    readings = f"{encoder['bins']} bins per sensor, " if "bins" in encoder else ""
-    rule = ", ".join(f"{key} {value}" for key, value in config["rule"].items() if key != "name")
-    rows = {
-        "architecture": f"{vsa['name']}, d = {vsa['dim']:,}, {vsa['dtype']}",
-        "default: readings": f"{readings}{encoder['name']} codes, joined by {config['record']['name']}",
-        "default: protection": config["protection"]["name"],
-        "default: learning rule": f"{config['rule']['name']} ({rule})",
-        "paper: readings": f"the same bins, {printed['encoder']['name']} codes, joined by {printed['record']['name']}, "
-        f"protection {printed['protection']['name']}",
-        "bundled: combination": config["composition"]["name"],
-        "arena and body": f"{config['arena']['name']}, {config['body']}",
-        "starts": f"{config['starts']:,} held out for teacher, default and bundled; {config['other_starts']:,} for "
-        "others",
-        "seed": number(config["seed"]),
-    }
-    return [{"setting": name, "value": value} for name, value in rows.items()]
+    order = rows.controller.map(list(names).index)
+    return rows.iloc[order.argsort(kind="stable")].to_dict(orient="records")

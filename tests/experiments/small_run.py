@@ -15,8 +15,8 @@ from rich.progress import Progress
 import sim
 from behaviours import Behaviour, Demonstrations, Policy
 from experiments.corral import study
-from experiments.corral.controllers import CONTROLLERS, Controller
-from experiments.corral.measure import Material, prepare
+from experiments.corral.controllers import CONTROLLERS, Controller, Material
+from experiments.corral.measure import prepare
 from experiments.corral.settings import Corral
 from experiments.kit import Outcome
 from experiments.kit.run import run
@@ -76,7 +76,7 @@ def material() -> Material:
 @cache
 @one_thread()
 def controller(name: str) -> Controller:
-    return CONTROLLERS[name](material().task)
+    return CONTROLLERS[name](material())
 
 
 def program(name: str) -> Behaviour | Policy:

@@ -9,9 +9,8 @@ from kits import composed
 import sim
 from behaviours import BehaviourBank, Demonstrations
 from experiments.corral import study
-from experiments.corral.command_map import command_maps
+from experiments.corral.command_map import ambiguous_share, command_maps
 from experiments.corral.controllers import CONTROLLERS, bins_of, printed_space
-from experiments.corral.failures import ambiguous_share
 from experiments.corral.forgetting import learners
 from experiments.corral.settings import PAPER, Corral
 from experiments.kit import parts

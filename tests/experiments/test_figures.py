@@ -10,14 +10,24 @@ import numpy as np
 import pandas as pd
 import pytest
 import torch
+from matplotlib.collections import LineCollection
 from PIL import Image
 from small_run import STARTS, held_out, material, one_thread, program, rollout, settings
 
 import sim
 from behaviours import Demonstrations
-from experiments.corral import figures, text
-from experiments.corral.command_map import COMMANDS, DISTANCE, LEFT, RIGHT, SLICES, Slice, command_map, kinds
-from experiments.corral.failures import PLACES, ambiguous_share, ends, mistakes, unlike_teacher
+from experiments.corral import figures
+from experiments.corral.command_map import (
+    COMMANDS,
+    DISTANCE,
+    LEFT,
+    RIGHT,
+    SLICES,
+    Slice,
+    ambiguous_share,
+    command_map,
+    kinds,
+)
 from experiments.corral.forgetting import (
     CLIPPED,
     DEFAULT,
@@ -29,10 +39,17 @@ from experiments.corral.forgetting import (
     most_frequent,
     recalled,
 )
-from experiments.corral.map_figure import command_maps
-from experiments.corral.measure import driven
+from experiments.corral.page import why_it_forgets
 from experiments.corral.tables import failing
-from experiments.corral.trajectories import as_rollout, control_steps, representative_episode, timeline
+from experiments.corral.trajectories import (
+    PLACES,
+    as_rollout,
+    control_steps,
+    episodes_of,
+    mistakes,
+    representative_episode,
+    with_recall,
+)
 from experiments.kit.figures import png
 
 NAMES = {(1, 1): "forward", (-1, 1): "turn left", (1, -1): "turn right"}
@@ -49,7 +66,11 @@ def name_of(command: Any) -> str:
 
 
 def episodes(*names: str) -> pd.DataFrame:
-    return pd.concat([pd.DataFrame(driven(rollout(name))).assign(controller=name) for name in names])
+    return pd.concat([episodes_of(rollout(name), steps(name)).assign(controller=name) for name in names])
+
+
+def steps(name: str) -> pd.DataFrame:
+    return control_steps(rollout(name))
 
 
 def bins_of(name: str) -> int:
@@ -137,23 +158,16 @@ def test_conditions_that_all_contradict_are_no_basis() -> None:
 
 def test_the_words_follow_the_numbers() -> None:
     count = 40
-    rights = {PRINTED: 0.5, CLIPPED: 0.25, MEAN: 0.25, SUM: 0.25, DEFAULT: 1.0}
-    panel = pd.DataFrame({name: np.arange(count) >= count * (1 - share) for name, share in rights.items()})
-    panel = panel.assign(bins=8, age=np.arange(count)[::-1])
-    words, reason = text.recall_summary(panel, {"clip_each_step": True})
-    assert "as printed, the program recalls 50 %" in words
-    assert "25 %: 100 % of the newest 8, 0 % of the oldest 8." in words
-    assert "The largest gain comes from the default's rule and encoding (+75.0 points)." in words
-    assert "clip" in reason
-    assert len(text.recall_summary(panel, {"clip_each_step": False})) == 1
-    (words,) = text.recall_summary(panel.assign(**dict.fromkeys(rights, True)), {"clip_each_step": True})
-    assert words.endswith("None of these steps gains anything here.")
+    fading = pd.DataFrame({"bins": 8, "age": np.arange(count)[::-1], CLIPPED: np.arange(count) >= count * 3 / 4})
+    words = why_it_forgets([fading, fading.assign(bins=4)])
+    assert "recalls 100% of the newest fifth and 0% of the oldest at 8 bins, 100% of the newest fifth" in words
+    assert why_it_forgets([fading.assign(**{CLIPPED: True})]) == ""
 
 
 @pytest.mark.parametrize("who", ["default", "bundled"])
 def test_a_timeline_is_the_recall_moment_by_moment(who: str) -> None:
     path = rollout(who).slice(2)
-    line = timeline(control_steps(rollout(who), STARTS, program(who)), 2)
+    line = with_recall(steps(who).loc[lambda frame: frame.episode == 2], program(who))
     assert line.seconds.iloc[-1] == pytest.approx((len(path) - 1) / 20)
     for at in range(0, len(path), 25):
         recall = program(who)(path.sensors[at][None])
@@ -168,7 +182,9 @@ def test_a_timeline_is_the_recall_moment_by_moment(who: str) -> None:
 
 def test_a_rollout_comes_back_from_its_frames() -> None:
     one = rollout("paper")
-    again = as_rollout(control_steps(one, [0, 1, 5]), episodes("paper"), one.arena, one.seed, one.seconds)
+    kept = steps("paper").loc[lambda frame: frame.episode.isin([0, 1, 5])]
+    again = as_rollout(kept, episodes("paper"), settings())
+    assert (again.arena, again.seed, again.seconds) == (one.arena, one.seed, one.seconds)
     assert again.summary().success_rate == one.success[[0, 1, 5]].mean()
     for episode in (0, 1, 5):
         for name in ("x", "heading", "sensors", "commands", "at_lamp"):
@@ -197,23 +213,22 @@ def test_failures_against_a_walk_through_the_episodes(who: str) -> None:
     assert failed
     found: Counter[tuple[str, str]] = Counter()
     places: Counter[str] = Counter()
-    steps = 0
+    count = 0
     for episode in failed:
         path = one.slice(episode)
-        steps += len(path)
+        count += len(path)
         for sensors, command in zip(path.sensors, path.commands, strict=True):
             rule = int(sim.Teacher().rule(sensors[None])[0])
             given = COMMANDS[int(kinds(command[None])[0])]
             if given != name_of(sim.Teacher()(sensors[None])[0]):
                 found[sim.TEACHER_RULES[rule], given] += 1
-        inside = max(abs(path.x[-1]), abs(path.y[-1])) < one.arena.side / 2
-        places[PLACES[2] if path.at_lamp[-1] else PLACES[0] if inside else PLACES[1]] += 1
+        places[PLACES[2] if path.at_lamp[-1] else PLACES[int(one.escaped[episode])]] += 1
     (row,) = failing(episodes(who), [who])
     assert (row["failed"], row["of"]) == (len(failed), len(STARTS))
     assert {place: row[place] for place in PLACES} == {place: places[place] for place in PLACES}
-    assert row["unlike_teacher"] == pytest.approx(sum(found.values()) / steps)
-    rows = mistakes(one)
-    assert {(row["rule"], row["command"]): round(row["share"] * steps) for row in rows} == dict(found)
+    assert row["unlike_teacher"] == pytest.approx(sum(found.values()) / count)
+    rows = mistakes(steps(who).loc[lambda frame: frame.episode.isin(failed)])
+    assert {(row["rule"], row["command"]): round(row["share"] * count) for row in rows} == dict(found)
     assert [row["share"] for row in rows] == sorted((row["share"] for row in rows), reverse=True)
 
 
@@ -221,10 +236,13 @@ def test_a_controller_that_never_fails_has_no_mistakes() -> None:
     one = rollout("teacher")
     solved = one.success
     assert solved.any()
-    assert [end is None for end in ends(one)] == solved.tolist()
-    assert not unlike_teacher(one).any()
-    (row,) = failing(episodes("teacher").loc[lambda frame: frame.success], ["teacher"])
-    assert (row["failed"], row["unlike_teacher"]) == (0, None)
+    driven = episodes("teacher")
+    assert driven.end.isna().tolist() == solved.tolist()
+    assert not driven.steps_unlike_teacher.any()
+    assert mistakes(steps("teacher")) == []
+    (row,) = failing(driven.loc[driven.success], ["teacher"])
+    assert row["failed"] == 0
+    assert np.isnan(row["unlike_teacher"])
 
 
 @pytest.mark.parametrize("who", ["default", "paper", "bundled"])
@@ -250,12 +268,11 @@ def test_the_success_chart_says_what_it_draws() -> None:
     table = [{"controller": name, **asdict(rollout(name).summary())} for name in ("teacher", "paper", "random")]
     (axes,) = figures.success(table).axes
     assert [label.get_text() for label in axes.get_yticklabels()] == [row["controller"] for row in table]
-    dots = [line.get_xdata() for line in axes.lines if line.get_marker() == "o"]
-    assert np.concatenate([np.atleast_1d(np.asarray(dot)) for dot in dots]).tolist() == [
-        row["success_rate"] for row in table
-    ]
-    first = table[0]
-    assert f"[{first['success_low']:.3f}, {first['success_high']:.3f}]" in axes.texts[0].get_text()
+    dots, bars = axes.lines[0], axes.collections[0]
+    assert isinstance(bars, LineCollection)
+    assert np.asarray(dots.get_xdata()).tolist() == [row["success_rate"] for row in table]
+    ends = np.array([np.asarray(bar)[:, 0] for bar in bars.get_segments()])
+    np.testing.assert_allclose(ends, [(row["success_low"], row["success_high"]) for row in table])
     # The first row of the table is drawn at the top.
     assert axes.get_ylim()[0] > axes.get_ylim()[1]
 
@@ -270,8 +287,8 @@ def test_the_recall_figure_draws_the_numbers(panel: pd.DataFrame) -> None:
 
 def test_the_map_figure_draws_the_commands() -> None:
     maps = {plane: command_map(program("default"), 8, plane, held_out()) for plane in SLICES}
-    figure = command_maps({"default": pd.concat(maps.values())})
-    images = [np.asarray(axes.images[0].get_array()).ravel() for axes in figure.axes]
+    figure = figures.command_maps({"default": pd.concat(maps.values())})
+    images = [np.asarray(axes.collections[0].get_array()).ravel() for axes in figure.axes]
     for shown, teacher, learned in zip(maps.values(), images[:4], images[4:], strict=True):
         np.testing.assert_array_equal(teacher, shown.teacher)
         np.testing.assert_array_equal(learned, shown.learned)
