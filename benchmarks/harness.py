@@ -38,7 +38,7 @@ class Case:
     calls: int = 1
     """Calls in one timed run: many for what takes microseconds."""
     timed: bool = False
-    """Whether calls measure themselves, and return seconds."""
+    """Whether calls measure themselves, each in a new process, and return seconds."""
     more: Mapping[str, Any] = field(default_factory=dict)
     """Further columns of the row."""
 
@@ -99,7 +99,7 @@ def _alternate(calls: Mapping[str, Call], case: Case, repeats: int, device: str)
         warm = {name: _time(call, case, 0, device) for name, call in calls.items()}
         for run in range(repeats):
             for name, call in calls.items():
-                if warm[name] < _SHORT:
+                if warm[name] < _SHORT and not case.timed:
                     call(run % INPUTS)  # not timed: caches and allocator are then its own, not those of the one before
                 times[name].append(_time(call, case, run, device))
     return {name: statistics.median(values) for name, values in times.items()}

@@ -40,7 +40,7 @@ FIT_TIMES = "fit_times"
 def measure(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
     """The rows of one work, with the options of the command."""
     if name == GROWTH:
-        return list(growth.rows(options.device, max(options.threads), small=options.small))
+        return list(growth.rows(options.device, max(options.threads), min(options.repeats, 3), options.small))
     if name == FIT_TIMES:
         return list(fit_times.rows(max(options.threads), small=options.small))
     rows, console = [], wide_console()

@@ -20,7 +20,16 @@ from experiments.corral.trajectories import driven_episodes
 from experiments.kit import Cell, Row, Study, grid
 from experiments.kit.intervals import proportion
 
-SLOWEST = ("default_wheeled", "teacher_wheeled", "default_bullet", "teacher_bullet", "paper_best_bins", "bundled", "default", "paper")
+SLOWEST = (
+    "default_wheeled",
+    "teacher_wheeled",
+    "default_bullet",
+    "teacher_bullet",
+    "paper_best_bins",
+    "bundled",
+    "default",
+    "paper",
+)
 
 
 def cells(settings: Corral) -> list[Cell]:

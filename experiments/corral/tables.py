@@ -45,7 +45,7 @@ MAIN = Table(
             about="success on the starts that all controllers of this table drove, on which they can be compared",
         ),
         Column(
-            "minus_original", "difference", "+.3f",
+            "minus_original", "diff", "+.3f",
             about="success minus that of the row which it repeats in the physics engine, on the starts that both drove",
         ),
         Column("escape_rate", "escape", about="share of episodes in which the robot leaves the corral at any time"),

@@ -28,6 +28,7 @@ COLUMNS = {
 def in_this_process(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """Works that are measured one after the other here, since a process for each takes seconds to begin."""
     monkeypatch.setattr("benchmarks.__main__.isolated", lambda work, *arguments, memory: work(*arguments))
+    monkeypatch.setattr("benchmarks.floors._SIDE", {"cpu": 64})
     yield
     torch.compiler.reset()
     corral.samples.cache_clear()
@@ -93,6 +94,7 @@ def test_a_page_that_is_not_there_is_said_at_once(
     assert f"{tmp_path} has no benchmarks.md" in capsys.readouterr().err
 
 
+@pytest.mark.usefixtures("in_this_process")
 def test_a_part_is_printed_and_leaves_the_files_of_the_whole(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:

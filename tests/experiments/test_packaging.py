@@ -55,7 +55,7 @@ def test_the_console_command_takes_the_users_own_configs(installed: Path) -> Non
         "# @package _global_\ncontrollers: [default]\nencoder: {bins: 16}\n"
     )
     command = installed / "site" / "bin" / "torchvsa-corral"
-    done = run(installed, command, "--config-dir", "mine", "experiment=tiny", "animate=false", *SMALL)
+    done = run(installed, command, "--config-dir", "mine", "experiment=tiny", "animate=false", "workers=1", *SMALL)
     assert done.returncode == 0, done.stderr
     content = results(installed / "outputs")
     assert content["config"]["encoder"]["bins"] == content["table"][0]["bins"] == 16

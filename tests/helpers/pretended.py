@@ -4,13 +4,13 @@ What would fail on a GPU fails here too: mixing tensors of two devices, or handi
 device when this is imported, for good, so that it belongs in a process of its own: see `devices`.
 """
 
+from collections.abc import Callable
 from copy import deepcopy
 from typing import Any, cast
 
 import torch
 from torch import Tensor, nn
 from torch._library.custom_ops import OPDEFS
-from torch.utils import _pytree as trees
 from torch.utils._python_dispatch import TorchDispatchMode
 from torch.utils.backend_registration import _setup_privateuseone_for_python_backend
 
@@ -81,7 +81,8 @@ def _run(func: Any, args: Any, kwargs: dict[str, Any]) -> Any:
     if func in _INDEXING and isinstance(args[0], Elsewhere):
         # An index from the CPU is welcome on a GPU.
         args = (args[0], [None if index is None else index.to(NAME) for index in args[1]], *args[2:])
-    tensors = [x for x in trees.tree_leaves((args, kwargs)) if isinstance(x, Tensor)]
+    tensors: list[Tensor] = []
+    _changed((args, kwargs), lambda x: tensors.append(x) or x)
     there = [x for x in tensors if isinstance(x, Elsewhere)]
     moves = func in (aten._to_copy.default, aten.copy_.default)
     if there and not moves and any(x.dim() > 0 and not isinstance(x, Elsewhere) for x in tensors):
@@ -93,12 +94,23 @@ def _run(func: Any, args: Any, kwargs: dict[str, Any]) -> Any:
     masked = func in _INDEXING and any(x.dtype == torch.bool for x in there[1:])
     if there and (func in _WAITS or masked or (moves and not answers_there)):
         waited.append(str(func))
-    args, kwargs = trees.tree_map_only(Elsewhere, lambda x: x.content, (args, kwargs))
+    args, kwargs = _changed((args, kwargs), lambda x: x.content if isinstance(x, Elsewhere) else x)
     answer = _VIEWS.get(func, func)(*args, **kwargs)
     if not answers_there:
         return answer
     known = {id(x.content): x for x in there}  # what was changed in place is the same tensor again
-    return trees.tree_map_only(Tensor, lambda t: known[id(t)] if id(t) in known else Elsewhere(t), answer)
+    return _changed(answer, lambda t: known[id(t)] if id(t) in known else Elsewhere(t))
+
+
+def _changed(tree: Any, change: Callable[[Tensor], Tensor]) -> Any:
+    """The same tree of tuples, lists and dicts with other tensors; PyTorch's own walk takes most of a test's time."""
+    if isinstance(tree, Tensor):
+        return change(tree)
+    if isinstance(tree, (tuple, list)):
+        return type(tree)([_changed(part, change) for part in tree])
+    if isinstance(tree, dict):
+        return {key: _changed(part, change) for key, part in tree.items()}
+    return tree
 
 
 _library = torch.library.Library("aten", "IMPL")
