@@ -123,8 +123,8 @@ def draw_episodes(arena: Arena, seed: int, episodes: Iterable[int]) -> tuple[Flo
 
     A generator is seeded with (seed, episode), so every controller gets the same start and the same noise at any batch
     size, worker count or order. Positions are uniform over the floor without its margin and without the surroundings
-    of obstacles and lamps, headings over the circle. Raises `ValueError` unless seed and episodes are whole numbers, 0 or more,
-    and if no free place is found.
+    of obstacles and lamps, headings over the circle. Raises `ValueError` unless seed and episodes are whole numbers, 0
+    or more, and if no free place is found.
     """
     seed = whole_number("seed", seed)
     generators = [np.random.default_rng([seed, whole_number("episode", episode)]) for episode in episodes]

@@ -18,7 +18,7 @@ WHOLE = ("episodes", "pairs_stored", "bins")
 
 
 def is_learner(row: Mapping[str, Any]) -> bool:
-    """Whether a row competes; teachers are what it is measured against, and rows in the physics engine repeat others."""
+    """Whether a row competes: teachers are what it is measured against, rows in the physics engine repeat others."""
     return not row["controller"].startswith("teacher") and original(row["controller"]) == row["controller"]
 
 
