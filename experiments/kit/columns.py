@@ -139,9 +139,9 @@ class Table:
 
 
 def aggregated(
-    records: pd.DataFrame, keys: Sequence[str], order: Sequence[Row] = (), **columns: tuple[str, str]
+    records: pd.DataFrame, keys: Sequence[str], columns: Mapping[str, tuple[str, str]], order: Sequence[Row] = ()
 ) -> list[dict[str, Any]]:
-    """A row for each combination of `keys`, with named aggregates `name=(column, method of a series)`.
+    """A row for each combination of `keys`, with `columns` by name: a column of the records, and a method of a series.
 
     Rows are in the order of the records, or of the cells in `order`, which hold the keys.
     """

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -129,11 +130,7 @@ def panels(
     width, height = size[0] * len(columns), size[1] * len(rows)
     figure = Figure(figsize=(max(0.9 + width, 5.4), 0.9 + height), layout="constrained")
     grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
-    found = {
-        (one, other): axes
-        for one, line in zip(rows, grid, strict=True)
-        for other, axes in zip(columns, line, strict=True)
-    }
+    found = dict(zip(itertools.product(rows, columns), grid.ravel(), strict=True))
     for (one, other), axes in found.items():
         here = frame.loc[(frame[row] == one) & (frame[column] == other)]
         lines(axes, here, x, "value", hue, low="low", high="high", **looks)
@@ -149,7 +146,8 @@ def legend_below(figure: Figure, axes: Axes | None = None, columns: int | None =
     """One legend for the whole figure, below it, with the entries of one panel, or of all."""
     entries: dict[str, Any] = {}
     for panel in figure.axes if axes is None else [axes]:
-        entries |= dict(zip(*reversed(panel.get_legend_handles_labels()), strict=True))
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
     for panel in figure.axes:
         if (legend := panel.get_legend()) is not None:
             legend.remove()

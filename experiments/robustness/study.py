@@ -178,11 +178,14 @@ def summarise(settings: Robustness, records: pd.DataFrame) -> list[Row]:
     """One row for each case, the draws together; and one for the teacher."""
     teacher = records[records.learner == TEACHER].iloc[0]
     table: list[Row] = [{"learner": TEACHER, **corral.success(teacher.episodes, teacher.successes)}]
-    found = aggregated(
-        records.loc[records.learner != TEACHER], KEYS, cases(settings), episodes=("episodes", "sum"),
-        successes=("successes", "sum"), agreement=("agreement", "mean"), agreement_min=("agreement", "min"),
-        agreement_max=("agreement", "max"),
-    )  # fmt: skip
+    columns = {
+        "episodes": ("episodes", "sum"),
+        "successes": ("successes", "sum"),
+        "agreement": ("agreement", "mean"),
+        "agreement_min": ("agreement", "min"),
+        "agreement_max": ("agreement", "max"),
+    }
+    found = aggregated(records.loc[records.learner != TEACHER], KEYS, columns, cases(settings))
     return table + [row | corral.success(row["episodes"], row.pop("successes")) for row in found]
 
 

@@ -136,7 +136,7 @@ def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -
     assert [path.name for path in folder.rglob("*.png")] == ["robustness.png"]
     assert "Shares that are survived" in page
     assert "how much there is to damage" in page
-    assert "Sign flipped, the largest share that leaves 95% of the agreement: <code>decision_tree</code>" in page
+    assert "Sign flipped, the largest share that leaves 95% of the agreement: <code>default</code> program 0%" in page
 
 
 def test_the_same_seed_gives_the_same_results_in_other_batches(finished: tuple[Path, str], tmp_path: Path) -> None:
