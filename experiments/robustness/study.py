@@ -186,7 +186,9 @@ def summarise(settings: Robustness, records: pd.DataFrame) -> list[Row]:
         "agreement_max": ("agreement", "max"),
     }
     found = aggregated(records.loc[records.learner != TEACHER], KEYS, columns, cases(settings))
-    return table + [row | corral.success(row["episodes"], row.pop("successes")) for row in found]
+    for row in found:
+        row |= corral.success(row["episodes"], row.pop("successes"))
+    return table + found
 
 
 def metrics(settings: Robustness, records: pd.DataFrame, table: list[Row]) -> dict[str, float | None]:
