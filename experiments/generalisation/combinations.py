@@ -4,63 +4,44 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from behaviours import Rule, Space
-from experiments.kit import Part, part, parts, settings
+from experiments.kit import parts, settings
+from experiments.kit.settings import named_parts
 from experiments.tasks.corral import schema
 
-
-@dataclass
-class Encoders:
-    """Codes of one reading."""
-
-    level: Part = part("encoder", "level", "neighbouring bins resemble each other")
-    lookup: Part = part("encoder", "lookup", "bins are unrelated, as in the paper")
-
-
-@dataclass
-class Protections:
-    """What is done to a condition before it is bound."""
-
-    none: Part = part("protection", "none", "similar conditions stay similar")
-    self_shift: Part = part("protection", "self_shift", "the self-derived shift of the paper")
-    self_shift_sum: Part = part("protection", "self_shift_sum", "the same with widths spread evenly")
-
-
-@dataclass
-class Records:
-    """How the codes of all sensors become a condition."""
-
-    product: Part = part("record", "product", "multiplies the similarities of the sensors")
-    sum: Part = part("record", "sum", "averages them, as in the paper")
-    subset_product: Part = part("record", "subset_product", "a product over some sensors for each dimension")
-
-
-@dataclass
-class Rules:
-    """How a program is learned."""
-
-    error_driven: Part = part("rule", "error_driven", "corrections where the recall is wrong")
-    one_shot: Part = part("rule", "one_shot", "each new pair is added once")
-    least_squares: Part = part("rule", "least_squares", "ridge regression")
-    gradient: Part = part("rule", "gradient", "gradient descent")
+ENCODERS = {
+    "level": "neighbouring bins resemble each other",
+    "lookup": "bins are unrelated, as in the paper",
+}
+PROTECTIONS = {
+    "none": "similar conditions stay similar",
+    "self_shift": "the self-derived shift of the paper",
+    "self_shift_sum": "the same with widths spread evenly",
+}
+RECORDS = {
+    "product": "multiplies the similarities of the sensors",
+    "sum": "averages them, as in the paper",
+    "subset_product": "a product over some sensors for each dimension",
+}
+RULES = {
+    "error_driven": "corrections where the recall is wrong",
+    "one_shot": "each new pair is added once",
+    "least_squares": "ridge regression",
+    "gradient": "gradient descent",
+}
 
 
 @dataclass
 class Options:
-    """What the names of parts mean."""
+    """What the names of parts mean: by default the options of these names."""
 
-    encoder: Encoders = settings(Encoders, "encoders by name")
-    protection: Protections = settings(Protections, "protections by name")
-    record: Records = settings(Records, "records by name")
-    rule: Rules = settings(Rules, "rules by name")
-
-
-def names(cls: type) -> list[str]:
-    """The names of the options in one of the classes above."""
-    return [field.name for field in fields(cls)]
+    encoder: Any = settings(named_parts("encoder", ENCODERS), "encoders by name")
+    protection: Any = settings(named_parts("protection", PROTECTIONS), "protections by name")
+    record: Any = settings(named_parts("record", RECORDS), "records by name")
+    rule: Any = settings(named_parts("rule", RULES), "rules by name")
 
 
 @dataclass(frozen=True)

@@ -22,19 +22,18 @@ from behaviours import Demonstrations, Space
 from behaviours.learning import no_convergence_warnings
 from behaviours.ordered import distinct_rows
 from experiments.generalisation.combinations import (
+    ENCODERS,
+    PROTECTIONS,
+    RECORDS,
+    RULES,
     Combination,
-    Encoders,
     Options,
-    Protections,
-    Records,
-    Rules,
     codebooks,
     combine,
-    names,
     rule,
 )
-from experiments.generalisation.corral_results import HOME, TEACHER, curves, headline, summarise, tables
-from experiments.kit import Cell, Drawing, Part, Row, Study, part, parts, setting, settings
+from experiments.generalisation.corral_results import FIGURE, HOME, TEACHER, headline, summarise, tables
+from experiments.kit import Cell, Part, Row, Study, part, parts, setting, settings
 from experiments.models.baselines import CLASSIFIERS, Classified
 from experiments.tasks.agreement import right
 from experiments.tasks.corral import FIRST_DEMONSTRATION, Driving, drive, drive_together, moving, shown_in
@@ -50,18 +49,18 @@ class Generalisation(Driving):
     )
     draws: list[int] = setting([3, 3, 2, 1, 1], "how many times each of them is drawn anew", low=1)
     encoders: list[str] = setting(
-        names(Encoders),
+        list(ENCODERS),
         "codes of one reading; the first encoder, protection, record and rule make the default",
-        choices=names(Encoders),
+        choices=ENCODERS,
         distinct=True,
     )
     protections: list[str] = setting(
-        names(Protections), "what is done to a condition before it is bound", choices=names(Protections), distinct=True
+        list(PROTECTIONS), "what is done to a condition before it is bound", choices=PROTECTIONS, distinct=True
     )
     records: list[str] = setting(
-        names(Records), "how the codes of all sensors become a condition", choices=names(Records), distinct=True
+        list(RECORDS), "how the codes of all sensors become a condition", choices=RECORDS, distinct=True
     )
-    rules: list[str] = setting(names(Rules), "how a program is learned", choices=names(Rules), distinct=True)
+    rules: list[str] = setting(list(RULES), "how a program is learned", choices=RULES, distinct=True)
     options: Options = settings(Options, "what these names mean")
     baselines: list[str] = setting(
         list(CLASSIFIERS), "learners without hypervectors", choices=CLASSIFIERS, distinct=True, empty=True
@@ -212,13 +211,6 @@ differ from the default, which is the first, in one part at most. Success: the r
 default drives from `starts` starts in each arena, all others from `variant_starts`, which are the first of those, and
 in unseen arenas after the most demonstrations only.
 """
-FIGURE = Drawing(
-    "generalisation",
-    curves,
-    "agreement with the teacher, and success, against the number of demonstrations",
-    "Left: medians over the draws; band: the default's range. Right: all draws together; band: the default's 95 % "
-    "interval; dotted: the default in unseen arenas.",
-)
 
 study = Study(
     name="generalisation",

@@ -1,14 +1,14 @@
 """What the corral's records show: a table of medians and rates, and how it looks by demonstrations."""
 
-from collections.abc import Iterable
+import itertools
 from typing import Any
 
+import numpy as np
 import pandas as pd
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from experiments.kit import Column, Outcome, Row, Table
-from experiments.kit.figures import BLACK, BLUE, legend_below, lines
+from experiments.kit import Column, Drawing, Outcome, Row, Table, aggregated, pivot
+from experiments.kit.figures import BLACK, BLUE, by_measure, legend_below, looks, panels
 from experiments.tasks.corral import success
 
 TEACHER = "teacher"
@@ -22,62 +22,38 @@ def summarise(settings: Any, records: pd.DataFrame) -> list[Row]:
 
     Success counts all draws together, with Wilson's 95 % interval.
     """
-    combinations = {combination.name: combination for combination in settings.combinations()}
-    records = records.reindex(columns=[*KEYS, "heldout", "unseen", "episodes", "successes"])
-    table: list[Row] = []
-    for _, group in records.groupby(KEYS, dropna=False, sort=False):
-        row: Row = group[KEYS].iloc[0].to_dict()
-        row["demonstrations"] = None if pd.isna(row["demonstrations"]) else int(row["demonstrations"])
-        if row["learner"] in combinations:
-            row |= vars(combinations[row["learner"]])
-        row["draws"] = len(group)
-        for name in ("heldout", "unseen"):
-            values = group[name]
-            row |= {name: values.median(), f"{name}_min": values.min(), f"{name}_max": values.max()}
-        table.append(row | success(group.episodes.sum(), group.successes.sum()))
-    return table
+    named = {combination.name: vars(combination) for combination in settings.combinations()}
+    spread = {"": "median", "_min": "min", "_max": "max"}
+    columns = {name + end: (name, how) for name in ("heldout", "unseen") for end, how in spread.items()}
+    columns |= {"draws": ("arena", "count"), "episodes": ("episodes", "sum"), "successes": ("successes", "sum")}
+    found = aggregated(records.reindex(columns=[*KEYS, "heldout", "unseen", "episodes", "successes"]), KEYS, columns)
+    for row in found:
+        row |= named.get(row["learner"], {}) | success(row["episodes"], row.pop("successes"))
+    return found
 
 
 def tables(outcome: Outcome) -> list[Table]:
     """Agreement, agreement where nothing was shown, and success, each with a column per number of demonstrations."""
     learners = [row for row in outcome.table if row["learner"] != TEACHER]
+    learners.sort(key=lambda row: row["demonstrations"])
+    teacher = [row for row in outcome.table if row["learner"] == TEACHER]
     home = [row for row in learners if row["arena"] == HOME]
-    counts = sorted({row["demonstrations"] for row in home})
-    shown = []
-    for name, title in (("heldout", "Agreement"), ("unseen", "Agreement in conditions not demonstrated")):
-        columns = [Column("learner"), *(Column(str(count), "", ".3f", _ends(count)) for count in counts)]
-        caption = "Median over the draws of the demonstrations, with lowest and highest, in held-out runs."
-        rows = _by_demonstrations(home, name, f"{name}_min", f"{name}_max")
-        shown.append(Table(f"{title}, by demonstrations", columns, caption).show(rows))
-    rate = ("success_rate", "success_low", "success_high")
-    teacher = {
-        row["arena"]: dict(zip((TEACHER, *_ends(TEACHER)), (row[name] for name in rate), strict=True))
-        for row in outcome.table
-        if row["learner"] == TEACHER
-    }
-    rows = [row | teacher[row["arena"]] for row in _by_demonstrations(learners, *rate)]
-    columns = [Column(str(name), "", ".2f", _ends(name)) for name in (*counts, TEACHER)]
-    caption = (
+    driven = [row for row in learners + teacher if row["success_rate"] is not None]
+    count = Column("demonstrations", format=lambda row: str(row["demonstrations"] or "none"))
+    range_of = "Median over the draws of the demonstrations, with lowest and highest, in held-out runs."
+    rates = (
         "Share of unseen starts from which the robot reaches the lamp and stays, all draws together, with Wilson's "
         "95 % interval. The teacher and the default have more starts than the others, so nothing is marked."
     )
-    table = Table("Success, by demonstrations", [Column("learner"), Column("arena"), *columns], caption)
-    return [*shown, table.show(rows)]
-
-
-def _ends(name: object) -> tuple[str, str]:
-    return f"{name}_low", f"{name}_high"
-
-
-def _by_demonstrations(rows: Iterable[Row], value: str, low: str, high: str) -> list[Row]:
-    """One row for each learner and arena, with a value and its ends for each number of demonstrations."""
-    found: dict[tuple[str, str], Row] = {}
-    for row in rows:
-        if row[value] is not None:
-            count, (first, last) = str(row["demonstrations"]), _ends(row["demonstrations"])
-            line = found.setdefault((row["learner"], row["arena"]), {"learner": row["learner"], "arena": row["arena"]})
-            line |= {count: row[value], first: row[low], last: row[high]}
-    return list(found.values())
+    heldout = Column("heldout", "", ".3f", ("heldout_min", "heldout_max"))
+    unseen = Column("unseen", "", ".3f", ("unseen_min", "unseen_max"))
+    rate = Column("success_rate", "", ".2f", ("success_low", "success_high"))
+    learner, arena = Column("learner"), Column("arena")
+    return [
+        pivot("Agreement, by demonstrations", home, [learner], count, heldout, range_of),
+        pivot("Agreement in conditions not demonstrated, by demonstrations", home, [learner], count, unseen, range_of),
+        pivot("Success, by demonstrations", driven, [learner, arena], count, rate, rates),
+    ]
 
 
 def headline(outcome: Outcome) -> str:
@@ -94,34 +70,36 @@ def headline(outcome: Outcome) -> str:
 
 FIXED = {"nearest neighbour": (BLACK, "X"), "decision tree": (BLACK, "h")}
 """Baselines are black. What is fixed here and for the default is given to no other line."""
+MEASURES = {
+    "agreement in held-out runs": ("heldout", "heldout_min", "heldout_max"),
+    "success from unseen starts": ("success_rate", "success_low", "success_high"),
+}
 ARENA_MARKERS = ("s", "^", "o", "P", "v")
 
 
 def curves(outcome: Outcome) -> Figure:
-    """Agreement and success against the number of demonstrations."""
+    """Agreement and success against the number of demonstrations; of the default also in unseen arenas."""
     labels = labels_of(outcome)
     default = next(iter(labels))
-    rows = [row for row in outcome.table if row["arena"] == HOME and row["learner"] in labels]
-    home = pd.DataFrame([row | {"label": labels[row["learner"]]} for row in rows])
-    figure = Figure(figsize=(11, 5.4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    for axes, value, low, high in (
-        (left, "heldout", "heldout_min", "heldout_max"),
-        (right, "success_rate", "success_low", "success_high"),
-    ):
-        order, fixed = list(labels.values()), {labels[default]: (BLUE, "D"), **FIXED}
-        lines(axes, home, "demonstrations", value, "label", order=order, fixed=fixed)
-        band = home.loc[home.learner == default].sort_values(by="demonstrations")
-        axes.fill_between(band.demonstrations, band[low], band[high], color=BLUE, alpha=0.15, linewidth=0)
+    elsewhere = {arena: f"default, in {arena}" for arena in outcome.settings.arenas if arena != HOME}
+    rows = [
+        row | {"label": labels[row["learner"]] if row["arena"] == HOME else elsewhere[row["arena"]], "column": ""}
+        for row in outcome.table
+        if row["learner"] == default or (row["learner"] in labels and row["arena"] == HOME)
+    ]
+    frame = by_measure(rows, MEASURES)
+    frame.loc[frame.label != labels[default], ["low", "high"]] = np.nan
+    fixed = {labels[default]: (BLUE, "D"), **FIXED}
+    fixed |= {label: (BLUE, marker) for label, marker in zip(elsewhere.values(), itertools.cycle(ARENA_MARKERS))}
+    order = [*labels.values(), *elsewhere.values()]
+    options: Any = {"order": order, "fixed": looks(order, fixed), "dashed": list(elsewhere.values())}
+    figure, grid = panels(frame, "demonstrations", "label", "measure", "column", (8, 3.4), **options)
+    counts = sorted(set(frame.demonstrations))
+    for axes in grid.values():
         axes.set_xscale("log")
-        counts = sorted(set(home.demonstrations))
         axes.set_xticks(counts, [str(count) for count in counts])
         axes.minorticks_off()
-        axes.set_xlabel("demonstrations")
-    _elsewhere(right, outcome, default)
-    left.set(title="agreement with the teacher in held-out runs", ylabel="agreement")
-    right.set(title="success from unseen starts", ylabel="success rate", ylim=(-0.03, 1.03))
-    legend_below(figure, right, 4)
+    legend_below(figure, columns=4)
     return figure
 
 
@@ -136,12 +114,11 @@ def labels_of(outcome: Outcome) -> dict[str, str]:
     return labels | {name: name.replace("_", " ") for name in outcome.settings.baselines}
 
 
-def _elsewhere(axes: Axes, outcome: Outcome, default: str) -> None:
-    """The success of the default in unseen arenas."""
-    arenas = [arena for arena in outcome.settings.arenas if arena != HOME]
-    for place, arena in enumerate(arenas):
-        rows = [row for row in outcome.table if (row["learner"], row["arena"]) == (default, arena)]
-        points = sorted((row["demonstrations"], row["success_rate"]) for row in rows)
-        marker = ARENA_MARKERS[place % len(ARENA_MARKERS)]
-        label = f"default, in {arena}"
-        axes.plot(*zip(*points, strict=True), ":", color=BLUE, marker=marker, mfc="white", ms=6, label=label)
+FIGURE = Drawing(
+    "generalisation",
+    curves,
+    "agreement with the teacher, and success, against the number of demonstrations",
+    "Agreement: medians over the draws; band: the default's range. Success: all draws together; band: the default's "
+    "95 % interval. Dashed: the default in unseen arenas.",
+    lambda outcome: pd.DataFrame(outcome.table),
+)

@@ -18,7 +18,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from behaviours import Demonstrations
-from experiments.kit import Cell, Column, Drawing, Outcome, Row, Study, Table, setting
+from experiments.kit import Cell, Column, Drawing, Outcome, Row, Study, Table, aggregated, setting
 from experiments.kit.figures import BLACK, GREEN, VERMILION
 from experiments.models.regressors import LEVELS, OURS, REGRESSORS, RegressorController, errors, regressor
 from experiments.tasks.corral import FIRST_DEMONSTRATION, Driving, drive, drive_together, driven, moving, success
@@ -123,12 +123,11 @@ def summarise(settings: Smooth, records: pd.DataFrame) -> list[Row]:
     """One row for each task and model: means over the folds; success with Wilson's 95 % interval."""
     keys, means = ["task", "model", "dim", "levels"], ["rmse", "mean_rmse", "relative", "rounding_rmse"]
     records = records.reindex(columns=[*keys, *means, "episodes", "successes"])
-    table: list[Row] = []
-    for _, group in records.groupby(keys, dropna=False, sort=False):
-        row: Row = group[keys].iloc[0].to_dict()
-        row |= {name: None if pd.isna(row[name]) else int(row[name]) for name in ("dim", "levels")}
-        row |= {"folds": len(group), **group[means].mean().to_dict()}
-        table.append(row | success(group.episodes.sum(), group.successes.sum()))
+    columns = {name: (name, "mean") for name in means} | {"folds": ("task", "count")}
+    columns |= {name: (name, "sum") for name in ("episodes", "successes")}
+    table = aggregated(records, keys, columns)
+    for row in table:
+        row |= success(row["episodes"], row.pop("successes"))
     order = (TEACHER, *REGRESSORS)
     return sorted(
         table,

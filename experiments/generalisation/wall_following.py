@@ -15,12 +15,26 @@ from typing import Any
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, grid, setting
-from experiments.kit.figures import BLACK, BLUE, GREY, legend_below
+from experiments.kit import (
+    Cell,
+    Column,
+    Drawing,
+    Outcome,
+    Row,
+    Settings,
+    Study,
+    Table,
+    aggregated,
+    grid,
+    pivot,
+    setting,
+)
+from experiments.kit.figures import BLUE, VERMILION, legend_below
 from experiments.models import torchhd
 from experiments.models.classifiers import CLASSIFIERS, SLOWEST, accuracy, not_installed
 from experiments.tasks.wall_following import FOLDS, SENSORS, SPLITS, samples
 
+KEYS = ("model", "sensors", "split")
 OURS = "one_hypervector"
 MODELS = [name for name in CLASSIFIERS if name != "one_hypervector_chosen"]
 
@@ -78,13 +92,14 @@ def measure(settings: WallFollowing, cell: Cell) -> Row:
 
 def summarise(settings: WallFollowing, records: pd.DataFrame) -> list[Row]:
     """One row for each model, number of sensors and split: the mean over the folds, and the time of all fits."""
-    table: list[Row] = []
-    for cell in grid(model=settings.models, sensors=settings.sensors, split=settings.splits):
-        group = records[(records[list(cell)] == list(cell.values())).all(axis=1)]
-        if len(group):
-            ends = {"accuracy_min": group.accuracy.min(), "accuracy_max": group.accuracy.max()}
-            table.append({**cell, "accuracy": group.accuracy.mean(), **ends, "fit_s": group.fit_s.sum()})
-    return table
+    columns = {
+        "accuracy": ("accuracy", "mean"),
+        "accuracy_min": ("accuracy", "min"),
+        "accuracy_max": ("accuracy", "max"),
+        "fit_s": ("fit_s", "sum"),
+    }
+    order = grid(model=settings.models, sensors=settings.sensors, split=settings.splits)
+    return aggregated(records, KEYS, columns, order)
 
 
 def metrics(settings: WallFollowing, records: pd.DataFrame, table: list[Row]) -> dict[str, float | None]:
@@ -94,31 +109,17 @@ def metrics(settings: WallFollowing, records: pd.DataFrame, table: list[Row]) ->
 
 def tables(outcome: Outcome) -> list[Table]:
     """A row for each model, and a column for each number of sensors and split."""
-    names = list(dict.fromkeys(_column(row) for row in outcome.table))
-    accuracies = [Column(name, format=".4f", best="max") for name in names]
-    seconds = [Column(name, format=".1f") for name in names]
     found = dict.fromkeys(row["model"] for row in outcome.table)
     missing = [model for model in outcome.settings.models if model not in found]
     notes = f" {note(missing)}." if missing else ""
+    best = f"Mean over the folds. The best of each column is marked.{notes}"
+    time = "The sum over the folds, one thread each."
+    model, fold = Column("model"), Column("split", format=lambda row: f"{row['sensors']}, {row['split']}")
+    accuracy, seconds = Column("accuracy", format=".4f", best="max"), Column("fit_s", format=".1f")
     return [
-        Table(f"Wall following: {title}", [Column("model"), *columns], caption).show(_pivot(outcome.table, value))
-        for value, title, columns, caption in (
-            ("accuracy", "accuracy", accuracies, f"Mean over the folds. The best of each column is marked.{notes}"),
-            ("fit_s", "seconds to fit all folds", seconds, "The sum over the folds, one thread each."),
-        )
+        pivot("Wall following: accuracy", outcome.table, [model], fold, accuracy, best),
+        pivot("Wall following: seconds to fit all folds", outcome.table, [model], fold, seconds, time),
     ]
-
-
-def _column(row: Row) -> str:
-    return f"{row['sensors']}, {row['split']}"
-
-
-def _pivot(table: list[Row], value: str) -> list[Row]:
-    """A row for each model, with a value for each number of sensors and split."""
-    rows: dict[str, Row] = {}
-    for row in table:
-        rows.setdefault(row["model"], {"model": row["model"]})[_column(row)] = row[value]
-    return list(rows.values())
 
 
 def headline(outcome: Outcome) -> str:
@@ -133,33 +134,33 @@ def headline(outcome: Outcome) -> str:
     return f"Accuracy with {sensors} sensors. {'; '.join(parts)}."
 
 
-SHAPES = {"stratified": ("o", -0.12, "random fifths (stratified)"), "blocks": ("s", 0.12, "fifths in time (blocks)")}
-"""Marker, shift and label of each split."""
+LABELS = {"stratified": "random fifths (stratified)", "blocks": "fifths in time (blocks)"}
 
 
 def dots(outcome: Outcome) -> Figure:
     """The accuracy of each model with the most sensors, and the range over the folds."""
-    sensors = max(outcome.settings.sensors)
-    rows = [row for row in outcome.table if row["sensors"] == sensors]
-    names = list(dict.fromkeys(row["model"] for row in rows))
+    import seaborn  # takes a second to load
+
+    sensors, models = max(outcome.settings.sensors), dict.fromkeys(row["model"] for row in outcome.table)
+    records = outcome.records[outcome.records.sensors == sensors]
+    records = records.assign(split=records.split.map(LABELS), model=records.model.str.replace("_", " "))
     figure = Figure(figsize=(7, 4.4), layout="constrained")
     axes = figure.subplots()
-    for split in outcome.settings.splits:
-        marker, shift, label = SHAPES[split]
-        filled = split == "stratified"
-        for row in (row for row in rows if row["split"] == split):
-            place = names.index(row["model"]) + shift
-            colour = BLUE if row["model"] == OURS else GREY
-            ends = [row["accuracy_min"], row["accuracy_max"]]
-            axes.plot(ends, [place, place], color=colour, linewidth=2.5, alpha=0.4)
-            face = colour if filled else "white"
-            axes.plot(row["accuracy"], place, marker, color=colour, markerfacecolor=face, markersize=6)
-        axes.plot([], [], marker, color=BLACK, markerfacecolor=BLACK if filled else "white", label=label)
-    axes.set_yticks(range(len(names)), [name.replace("_", " ") for name in names])
-    axes.set_ylim(len(names) - 0.4, -0.6)
-    axes.set(title=f"Wall following, {sensors} sensors", xlabel="accuracy on the fifth left out")
+    look: Any = {
+        "order": [name.replace("_", " ") for name in models],
+        "hue_order": [LABELS[split] for split in outcome.settings.splits],
+        "palette": [BLUE, VERMILION][: len(outcome.settings.splits)],
+        "markers": ["o", "s"][: len(outcome.settings.splits)],
+        "dodge": 0.24 if len(outcome.settings.splits) > 1 else False,
+    }
+    bars = {"linewidth": 2, "alpha": 0.5}
+    seaborn.pointplot(
+        records, x="accuracy", y="model", hue="split", errorbar=("pi", 100), err_kws=bars, linestyle="none",
+        markersize=5, ax=axes, **look,
+    )  # fmt: skip
+    axes.set(title=f"Wall following, {sensors} sensors", xlabel="accuracy on the fifth left out", ylabel="")
     axes.grid(visible=False, axis="y")
-    legend_below(figure, axes)
+    legend_below(figure)
     return figure
 
 
@@ -189,7 +190,7 @@ study = Study(
     prepare=prepare,
     measure=measure,
     summarise=summarise,
-    keys=("model", "sensors", "split"),
+    keys=KEYS,
     metrics=metrics,
     tables=tables,
     figures=[FIGURE],

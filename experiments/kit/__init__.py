@@ -5,7 +5,7 @@ pool, progress, going on after a stop, the table, the results and the page.
 """
 
 from experiments.kit import parts
-from experiments.kit.columns import Column, Table
+from experiments.kit.columns import Column, Table, aggregated, pivot
 from experiments.kit.page import Page
 from experiments.kit.settings import Part, Settings, part, setting, settings
 from experiments.kit.study import STUDIES, Cell, Drawing, Outcome, Row, Study, grid
@@ -22,9 +22,11 @@ __all__ = [
     "Settings",
     "Study",
     "Table",
+    "aggregated",
     "grid",
     "part",
     "parts",
+    "pivot",
     "setting",
     "settings",
 ]

@@ -12,8 +12,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, Literal
 
+import pandas as pd
 import rich.table
 
 NONE = "-"
@@ -134,6 +136,41 @@ class Table:
         lines.append(["---", *("---" if self.words else "---:" for _ in self.columns[1:])])
         lines += [[f"**{cell.text}**" if cell.mark == "best" else cell.text for cell in row] for row in self.cells]
         return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def aggregated(
+    records: pd.DataFrame, keys: Sequence[str], columns: Mapping[str, tuple[str, str]], order: Sequence[Row] = ()
+) -> list[dict[str, Any]]:
+    """A row for each combination of `keys`, with `columns` by name: a column of the records, and a method of a series.
+
+    Rows are in the order of the records, or of the cells in `order`, which hold the keys.
+    """
+    # As functions of one group: what pandas does for all groups at once differs in the last bit.
+    methods = {name: (column, getattr(pd.Series, method)) for name, (column, method) in columns.items()}
+    found: Any = records.groupby(list(keys), dropna=False, sort=False).agg(**methods).reset_index()
+    for key in keys:
+        if found[key].isna().any():  # which makes floats of whole numbers
+            found[key] = found[key].convert_dtypes().astype(object).where(found[key].notna(), None)
+    places = {tuple(cell[key] for key in keys): place for place, cell in enumerate(order)}
+    return sorted(found.to_dict("records"), key=lambda row: places.get(tuple(row[key] for key in keys), 0))
+
+
+def pivot(title: str, rows: Sequence[Row], keys: Sequence[Column], by: Column, value: Column, caption: str) -> Table:
+    """A table with a row for each combination of `keys`, and a column with the `value` for each text of `by`."""
+    lines: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for row in rows:
+        first = {column.key: row[column.key] for column in keys}
+        name = by.text(row)
+        lines.setdefault(tuple(first.values()), first).update({name: row[value.key], f"row of {name}": row})
+    names = dict.fromkeys(by.text(row) for row in rows)
+    columns = [
+        replace(value, key=name, label=name, format=partial(_pivoted, value, f"row of {name}")) for name in names
+    ]
+    return Table(title, [*keys, *columns], caption).show(list(lines.values()))
+
+
+def _pivoted(value: Column, place: str, line: Row) -> str:
+    return value.text(line[place]) if place in line else NONE
 
 
 def number(value: object, form: str = "") -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
@@ -105,11 +106,50 @@ def lines(
                 axes.fill_between(own[x], own[low], own[high], color=colours[name], alpha=0.15, linewidth=0)
 
 
-def legend_below(figure: Figure, axes: Axes, columns: int | None = None) -> None:
-    """One legend for the whole figure, below it, with the entries of one panel."""
-    handles, labels = axes.get_legend_handles_labels()
+def by_measure(table: Sequence[Mapping[str, Any]], measures: Mapping[str, Sequence[str]]) -> pd.DataFrame:
+    """The rows of a table for each measure that they have: its name as `measure`, and its `value`, `low` and `high`.
+
+    `measures` maps a name to these columns of the table; a measure without an interval has the first only.
+    """
+    frame = pd.DataFrame(table)
+    parts = []
+    for name, columns in measures.items():
+        numbers = {new: frame[old].astype(float) for new, old in zip(("value", "low", "high"), columns, strict=False)}
+        parts.append(frame.assign(measure=name, **numbers))
+    return pd.concat(parts).reindex(columns=[*frame, "measure", "value", "low", "high"]).dropna(subset="value")
+
+
+def panels(
+    frame: pd.DataFrame, x: str, hue: str, row: str, column: str, size: tuple[float, float], **looks: Any
+) -> tuple[Figure, dict[tuple[Any, Any], Axes]]:
+    """A figure of a frame of `by_measure`: `lines` in a panel for each value of `row` and of `column`.
+
+    `size` is that of a panel in inches; `looks` are options of `lines`. Returns the panels by the two values.
+    """
+    rows, columns = frame[row].unique(), frame[column].unique()
+    width, height = size[0] * len(columns), size[1] * len(rows)
+    figure = Figure(figsize=(max(0.9 + width, 5.4), 0.9 + height), layout="constrained")
+    grid = figure.subplots(len(rows), len(columns), sharex="col", sharey="row", squeeze=False)
+    found = dict(zip(itertools.product(rows, columns), grid.ravel(), strict=True))
+    for (one, other), axes in found.items():
+        here = frame.loc[(frame[row] == one) & (frame[column] == other)]
+        lines(axes, here, x, "value", hue, low="low", high="high", **looks)
+        axes.set(
+            xlabel=x if one == rows[-1] else "",
+            ylabel=one if other == columns[0] else "",
+            title=other if one == rows[0] else "",
+        )
+    return figure, found
+
+
+def legend_below(figure: Figure, axes: Axes | None = None, columns: int | None = None) -> None:
+    """One legend for the whole figure, below it, with the entries of one panel, or of all."""
+    entries: dict[str, Any] = {}
+    for panel in figure.axes if axes is None else [axes]:
+        for handle, label in zip(*panel.get_legend_handles_labels(), strict=True):
+            entries.setdefault(label, handle)
     for panel in figure.axes:
         if (legend := panel.get_legend()) is not None:
             legend.remove()
-    names = [label.replace("_", " ") for label in labels]
-    figure.legend(handles, names, loc="outside lower center", ncols=columns or min(len(names), 5))
+    names = [label.replace("_", " ") for label in entries]
+    figure.legend(list(entries.values()), names, loc="outside lower center", ncols=columns or min(len(names), 5))

@@ -59,6 +59,12 @@ def part(group: str, option: str | None, about: str) -> Any:
     return dataclasses.field(default=None, metadata={"about": about, "group": group, "option": option})
 
 
+def named_parts(group: str, options: Mapping[str, str]) -> type:
+    """A dataclass with a field for each of these options of a config group, which map names to meanings."""
+    fields = [(name, Part, part(group, name, about)) for name, about in options.items()]
+    return dataclasses.make_dataclass(f"{group}_parts", fields)
+
+
 def settings(cls: type, about: str) -> Any:
     """A field that holds further settings, of the dataclass `cls`."""
     return dataclasses.field(default_factory=cls, metadata={"about": about, "settings": cls})

@@ -69,11 +69,12 @@ class Drawing:
 
 def plain_page(page: Page, outcome: Outcome, study: Study) -> None:
     """The page of most studies: figures, tables, and how the numbers came about."""
-    section = page.section("Results")
-    for one in study.figures:
-        section.figure(one.name, lambda one=one: one.draw(outcome), one.alt, one.caption, one.data(outcome))
+    if study.figures:
+        section = page.section("Results")
+        for one in study.figures:
+            section.figure(one.name, lambda one=one: one.draw(outcome), one.alt, one.caption, one.data(outcome))
     for table in study.shown(outcome):
-        section.table(table)
+        page.section(table.title).table(table)
     if study.method:
         paragraphs = study.method.strip().split("\n\n")
         page.section("How it was measured").text(*(" ".join(text.split()) for text in paragraphs))

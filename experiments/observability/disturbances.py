@@ -185,23 +185,6 @@ class Aliased(Disturbance):
 DISTURBANCES: dict[str, type[Disturbance]] = {d.name: d for d in (Missing, Stuck, Delayed, Noisy, Aliased)}
 
 
-class DisturbedPolicy:
-    """A controller that gets disturbed readings; its state is the pair of the disturbance's and the controller's."""
-
-    def __init__(self, disturbance: Disturbance, policy: sim.ControllerLike) -> None:
-        self.disturbance, self.controller = disturbance, sim.as_controller(policy)
-
-    def start(self, episodes: Integers) -> tuple[Any, Any]:
-        """See `sim.Controller`."""
-        return self.disturbance.start(episodes), self.controller.start(episodes)
-
-    def step(self, readings: Floats, state: tuple[Any, Any]) -> tuple[Any, tuple[Any, Any]]:
-        """The controller's answer to the disturbed readings."""
-        seen, disturbance = self.disturbance.step(readings, state[0])
-        answer, controller = self.controller.step(seen, state[1])
-        return answer, (disturbance, controller)
-
-
 def disturb_in_turns(disturbances: Sequence[Disturbance], readings: Floats, episodes: Integers) -> Floats:
     """Recorded readings `[N, n]` with the disturbances taking turns, one per episode: the first, the second, ...
 

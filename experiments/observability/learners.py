@@ -8,14 +8,16 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from sklearn.tree import DecisionTreeClassifier
 
 import sim
 from behaviours import Gradient, Rule, Space
 from behaviours.learning import no_convergence_warnings
 from experiments.kit import parts
+from experiments.models.baselines import Classified
 from experiments.observability.disturbances import Disturbance
 from experiments.observability.memory import Memory, TeacherRuns
-from experiments.observability.windows import Answer, ProgramAnswer, TreeAnswer, over_windows
+from experiments.observability.windows import Answer, ProgramAnswer, over_windows
 from experiments.tasks import corral
 
 NO_MEMORY = Memory()
@@ -118,26 +120,23 @@ def _trace(task: Task, hold: bool = False) -> Learned:
     return best(task, {str(memory): partial(_program, task, memory) for memory in memories})
 
 
-def _tree(task: Task) -> Learned:
-    return _best_tree(task, [NO_MEMORY])
-
-
-def _tree_memory(task: Task) -> Learned:
-    holds = (False, True) if task.disturbances[0].gaps else (False,)
-    return _best_tree(task, [Memory(tuple(lags), hold) for lags in task.settings.lags for hold in holds])
-
-
-def _best_tree(task: Task, memories: Sequence[Memory]) -> Learned:
+def _tree(task: Task, memories: Sequence[Memory] = (NO_MEMORY,)) -> Learned:
     """The best tree with one of these memories and one of the sizes of leaves."""
 
     def grow(memory: Memory, leaf: int) -> Learned:
         train = task.train.demonstrations(task.disturbances, memory)
-        return Learned(TreeAnswer(train, leaf, task.settings.seed), memory)
+        model = DecisionTreeClassifier(min_samples_leaf=leaf, random_state=task.settings.seed)
+        return Learned(Classified(model, train), memory)
 
     leaves = task.settings.leaves
     return best(
         task, {f"{memory}, {leaf} a leaf": partial(grow, memory, leaf) for memory in memories for leaf in leaves}
     )
+
+
+def _tree_memory(task: Task) -> Learned:
+    holds = (False, True) if task.disturbances[0].gaps else (False,)
+    return _tree(task, [Memory(tuple(lags), hold) for lags in task.settings.lags for hold in holds])
 
 
 @dataclass(frozen=True)

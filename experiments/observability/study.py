@@ -18,9 +18,9 @@ from rich.progress import Progress
 
 import sim
 from behaviours import Space
-from experiments.kit import Cell, Column, Row, Study, Table, grid, parts, setting, settings
-from experiments.observability import page
-from experiments.observability.disturbances import DISTURBANCES, Aliased, Disturbance, DisturbedPolicy
+from experiments.kit import Cell, Row, Study, grid, parts, setting, settings
+from experiments.observability import results
+from experiments.observability.disturbances import DISTURBANCES, Aliased, Disturbance
 from experiments.observability.learners import LEARNERS, Task, compare, disturbed_rule
 from experiments.observability.memory import TeacherRuns
 from experiments.observability.windows import WindowPolicy
@@ -150,7 +150,7 @@ def measure(material: Material, cell: Cell) -> list[Row]:
     for disturbance in strengths:
         agreement = compare(learned, disturbance, material.heldout, settings.compare_every)
         row = {"strength": float(disturbance.strength), **memory, **asdict(agreement)}
-        policy = DisturbedPolicy(disturbance, WindowPolicy(learned.answer, learned.memory))
+        policy = WindowPolicy(disturbance, learned.answer, learned.memory)
         found += [{**row, **episode} for episode in driven(settings, policy)]
     return found
 
@@ -186,22 +186,10 @@ def metrics(settings: Observability, records: pd.DataFrame, table: list[Row]) ->
     """The validation figure of each choice."""
     return {
         f"{row['disturbance']}.{row['learner']}.validation.{row['choice']}": row["validation"]
-        for row in page.choices(records)
+        for row in results.choices(records)
     }
 
 
-TABLE = Table(
-    "Partly observable states",
-    [
-        Column("disturbance"),
-        Column("label", "strength"),
-        Column("learner"),
-        Column("agreement", format=".3f"),
-        Column("balanced_agreement", "balanced", ".3f"),
-        Column("success_rate", "success [95 %]", ".2f", ("success_low", "success_high")),
-        Column("episodes"),
-    ],
-)
 study = Study(
     name="observability",
     about="How robust is a learned behaviour to states that are observed in part, and does a memory help?",
@@ -213,8 +201,9 @@ study = Study(
     summarise=summarise,
     keys=KEYS,
     metrics=metrics,
-    table=TABLE,
-    headline=page.headline,
-    page=page.fill,
+    tables=results.tables,
+    figures=[results.FIGURE],
+    headline=results.headline,
+    method=results.METHOD,
     presets={"quick": {"disturbances": ["missing"], "starts": 0}},
 )

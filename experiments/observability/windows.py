@@ -6,13 +6,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import torch
-from sklearn.tree import DecisionTreeClassifier
 from torch import Tensor
 
 from behaviours import Behaviour, Demonstrations, Schema, Space
-from experiments.observability.disturbances import Floats, Integers
+from experiments.observability.disturbances import Disturbance, Floats, Integers
 from experiments.observability.memory import Memory
 from torchvsa.encoders import Encoder, History
 
@@ -61,19 +59,23 @@ def over_windows(space: Space, lags: Sequence[int]) -> Space:
 
 
 class WindowPolicy:
-    """A controller that answers windows; its state is the past readings `[B, p, n]` of each robot."""
+    """A controller that answers windows of disturbed readings.
 
-    def __init__(self, answer: Answer, memory: Memory) -> None:
-        self.answer, self.memory = answer, memory
+    Its state is that of the disturbance, and the past readings `[B, p, n]` of each robot.
+    """
 
-    def start(self, episodes: Integers) -> Tensor:
+    def __init__(self, disturbance: Disturbance, answer: Answer, memory: Memory) -> None:
+        self.disturbance, self.answer, self.memory = disturbance, answer, memory
+
+    def start(self, episodes: Integers) -> tuple[Any, Tensor]:
         """See `sim.Controller`."""
-        return self.memory.start(len(episodes))
+        return self.disturbance.start(episodes), self.memory.start(len(episodes))
 
-    def step(self, readings: Floats, state: Tensor) -> tuple[Floats, Tensor]:
+    def step(self, readings: Floats, state: tuple[Any, Tensor]) -> tuple[Floats, tuple[Any, Tensor]]:
         """Commands `[B, m]` for readings `[B, n]`."""
-        seen, state = self.memory.step(readings, state)
-        return self.answer(seen), state
+        disturbed, disturbance = self.disturbance.step(readings, state[0])
+        seen, past = self.memory.step(disturbed, state[1])
+        return self.answer(seen), (disturbance, past)
 
 
 class ProgramAnswer:
@@ -89,17 +91,3 @@ class ProgramAnswer:
         """Commands `[B, m]`."""
         answers = torch.cat([self.behaviour(block).commands for block in torch.from_numpy(seen).split(2048)])
         return torch.where(answers.isnan(), self.usual, answers).numpy()
-
-
-class TreeAnswer:
-    """The answer of a decision tree that learns the same windows."""
-
-    def __init__(self, train: Demonstrations, leaf: int, seed: int) -> None:
-        commands, labels = np.unique(train.commands.numpy(), axis=0, return_inverse=True)
-        self.commands: Floats = commands
-        self.model = DecisionTreeClassifier(min_samples_leaf=leaf, random_state=seed)
-        self.model.fit(train.sensors.numpy(), labels.ravel())
-
-    def __call__(self, seen: Floats) -> Floats:
-        """Commands `[B, m]`."""
-        return self.commands[np.asarray(self.model.predict(seen), dtype=np.int64)]

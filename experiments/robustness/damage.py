@@ -1,6 +1,6 @@
 """Damage to a share of the elements of something that has learned."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -61,14 +61,6 @@ class Damage:
         return copies
 
 
-class Damaged(Protocol):
-    """A learner of which a part was damaged. It can drive in the simulator."""
-
-    def __call__(self, sensors: Floats) -> Floats:
-        """Commands `[B, 2]` for readings `[B, 3]`."""
-        ...
-
-
 class Learner(Protocol):
     """Something that has learned, of which a part can be damaged."""
 
@@ -76,6 +68,6 @@ class Learner(Protocol):
         """How many elements the part has."""
         ...
 
-    def damaged(self, part: str, damage: Damage) -> Damaged:
-        """A copy of which `part` is damaged."""
+    def damaged(self, part: str, damage: Damage) -> Callable[[Floats], Floats]:
+        """A copy of which `part` is damaged: commands `[B, 2]` for readings `[B, 3]`."""
         ...

@@ -10,24 +10,22 @@ with them. Nothing is trained on damaged parts.
     torchvsa robustness learners=[default,mlp] damages=[flip] draws=2 drive_shares=[0]
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 from rich.progress import Progress
 
 import sim
 import torchvsa
 from behaviours import Demonstrations, Space
-from experiments.kit import Cell, Row, Study, grid, parts, setting, settings
+from experiments.kit import Cell, Row, Study, aggregated, grid, parts, setting, settings
 from experiments.models import hand_written
-from experiments.robustness import page
-from experiments.robustness.baselines import Network, Tree
-from experiments.robustness.damage import DAMAGES, PARAMETERS, PARTS, Damage, Damaged, Floats, Learner
+from experiments.robustness import results
+from experiments.robustness.baselines import network, tree
+from experiments.robustness.damage import DAMAGES, PARAMETERS, PARTS, Damage, Learner
 from experiments.robustness.programs import Program, refuse_undamageable
 from experiments.tasks import corral
 from experiments.tasks.agreement import share_right
@@ -80,7 +78,7 @@ def check(settings: Robustness) -> None:
             refuse_undamageable(space)
             parts.refuse_unsupported(parts.rule(options.rule), space)
     if "hand_written" in settings.learners:
-        LEARNERS["hand_written"].learn(settings, None)
+        _hand_written(settings, None)
 
 
 def space_of(settings: Robustness, options: Robustness | corral.Printed) -> Space:
@@ -97,46 +95,22 @@ def _hand_written(settings: Robustness, train: Any) -> Learner:
     return Program(hand_written.behaviour(torchvsa.architecture(**settings.vsa), settings.seed))
 
 
-@dataclass(frozen=True)
-class Maker:
-    """How a learner is made from demonstrations, and whether it is a hypervector."""
-
-    learn: Callable[[Robustness, Any], Learner]
-    hypervector: bool = True
-
-
-LEARNERS = {
-    "default": Maker(lambda settings, train: _program(settings, settings, train)),
-    "one_shot": Maker(lambda settings, train: _program(settings, settings.one_shot, train)),
-    "hand_written": Maker(_hand_written),
-    "mlp": Maker(lambda settings, train: Network(train, settings.seed, settings.hidden, settings.mlp_epochs), False),
-    "decision_tree": Maker(lambda settings, train: Tree(train, settings.seed), False),
+HYPERVECTORS = ("default", "one_shot", "hand_written")
+LEARNERS: dict[str, Callable[[Robustness, Any], Learner]] = {
+    "default": lambda settings, train: _program(settings, settings, train),
+    "one_shot": lambda settings, train: _program(settings, settings.one_shot, train),
+    "hand_written": _hand_written,
+    "mlp": lambda settings, train: network(train, settings.seed, settings.hidden, settings.mlp_epochs),
+    "decision_tree": lambda settings, train: tree(train, settings.seed),
 }
-
-
-class SharedStarts:
-    """Damaged copies of one learner that share the starts: copy e mod their number drives episode e."""
-
-    def __init__(self, copies: Sequence[Damaged]) -> None:
-        self.copies = copies
-
-    def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
-        """The state is the index of each robot's copy, `[B]`."""
-        return episodes % len(self.copies)
-
-    def step(self, readings: Floats, state: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
-        """Commands `[B, 2]` for readings `[B, 3]`."""
-        commands = np.empty((len(readings), len(sim.ACTUATORS)))
-        for index in np.unique(state).tolist():
-            commands[state == index] = self.copies[index](readings[state == index])
-        return commands, state
+"""How each learner is made from demonstrations."""
 
 
 def cases(settings: Robustness) -> list[Cell]:
     """The rows of the table, in its order."""
     found: list[Cell] = []
     for name in settings.learners:
-        damaged = settings.parts if LEARNERS[name].hypervector else [PARAMETERS]
+        damaged = settings.parts if name in HYPERVECTORS else [PARAMETERS]
         found += grid(learner=[name], part=damaged, damage=settings.damages, share=settings.shares)
     return found
 
@@ -169,35 +143,34 @@ def prepare(settings: Robustness, folder: Path, progress: Progress) -> Material:
     train, _ = corral.shown_in(drive("teacher demonstrates", range(first, first + settings.demonstrations)))
     heldout = drive("teacher, held out", range(settings.starts))
     names = progress.track(settings.learners, description="learn")
-    learners = {name: LEARNERS[name].learn(settings, train) for name in names}
+    learners = {name: LEARNERS[name](settings, train) for name in names}
     return Material(settings, learners, corral.moving(heldout), corral.driven(heldout))
 
 
 def measure(material: Material, cell: Cell) -> list[Row]:
-    """A row for each draw of the damage: its agreement with the teacher, and how its robots drove."""
+    """A row for each draw of the damage: its agreement with the teacher, and how its robots drove.
+
+    The draws share the starts: draw j of J drives from the starts j, j + J, j + 2J, ...
+    """
     settings, share = material.settings, cell["share"]
     if cell["learner"] == TEACHER:
         return [material.teacher]
     learner = material.learners[cell["learner"]]
     # Nothing is drawn where nothing is damaged, so that any part and damage will do.
     those = [cell] if share else [case for case in cases(settings) if cell.items() <= case.items()]
-    damages = [
-        Damage(those[0]["damage"], share, settings.noise, (settings.seed, draw))
-        for draw in range(settings.draws if share else 1)
-    ]
-    copies = [learner.damaged(those[0]["part"], damage) for damage in damages]
-    agreements = [share_right(copy, material.heldout) for copy in copies]
-    rollout = None
-    if share in settings.drive_shares:
-        arena = corral.arena(settings.arena)
-        rollout = corral.drive(settings, SharedStarts(copies), range(settings.starts), arena)
+    draws = settings.draws if share else 1
     rows: list[Row] = []
-    for case in those:
-        size = learner.elements(case["part"])
-        for draw, (damage, agreement) in enumerate(zip(damages, agreements, strict=True)):
-            row = {**case, "draw": draw, "elements": size, "damaged": damage.count(size), "agreement": agreement}
-            turns = [] if rollout is None else rollout.success[rollout.episode % len(copies) == draw]
-            rows.append({**row, "episodes": len(turns), "successes": int(sum(turns))})
+    for draw in range(draws):
+        damage = Damage(those[0]["damage"], share, settings.noise, (settings.seed, draw))
+        copy = learner.damaged(those[0]["part"], damage)
+        found = {"draw": draw, "agreement": share_right(copy, material.heldout), "episodes": 0, "successes": 0}
+        starts = range(draw, settings.starts, draws)
+        if share in settings.drive_shares and starts:
+            rollout = corral.drive(settings, copy, starts, corral.arena(settings.arena))
+            found |= {"episodes": len(rollout), "successes": int(rollout.success.sum())}
+        for case in those:
+            size = learner.elements(case["part"])
+            rows.append({**case, "elements": size, "damaged": damage.count(size), **found})
     return rows
 
 
@@ -205,13 +178,17 @@ def summarise(settings: Robustness, records: pd.DataFrame) -> list[Row]:
     """One row for each case, the draws together; and one for the teacher."""
     teacher = records[records.learner == TEACHER].iloc[0]
     table: list[Row] = [{"learner": TEACHER, **corral.success(teacher.episodes, teacher.successes)}]
-    groups = dict(iter(records.groupby(list(KEYS))))
-    for case in cases(settings):
-        rows = groups[tuple(case.values())]
-        driven = corral.success(rows.episodes.sum(), rows.successes.sum())
-        agreement = {"agreement": rows.agreement.mean(), "agreement_min": rows.agreement.min()}
-        table.append({**case, **agreement, "agreement_max": rows.agreement.max(), **driven})
-    return table
+    columns = {
+        "episodes": ("episodes", "sum"),
+        "successes": ("successes", "sum"),
+        "agreement": ("agreement", "mean"),
+        "agreement_min": ("agreement", "min"),
+        "agreement_max": ("agreement", "max"),
+    }
+    found = aggregated(records.loc[records.learner != TEACHER], KEYS, columns, cases(settings))
+    for row in found:
+        row |= corral.success(row["episodes"], row.pop("successes"))
+    return table + found
 
 
 def metrics(settings: Robustness, records: pd.DataFrame, table: list[Row]) -> dict[str, float | None]:
@@ -232,8 +209,9 @@ study = Study(
     summarise=summarise,
     keys=KEYS,
     metrics=metrics,
-    tables=page.tables,
-    headline=page.headline,
-    page=page.fill,
+    tables=results.tables,
+    figures=[results.FIGURE],
+    headline=results.headline,
+    method=results.METHOD,
     presets={"quick": {"draws": 1, "starts": 20, "shares": [0.0, 0.2, 0.4], "drive_shares": [0.0]}},
 )

@@ -4,11 +4,13 @@ import doctest
 import io
 
 import numpy as np
+import pandas as pd
 import pytest
 from rich.console import Console
 
 import sim
-from experiments.kit import Column, Table, columns, page, study
+from experiments.kit import Column, Table, aggregated, columns, page, pivot, study
+from experiments.kit.figures import by_measure
 from experiments.kit.intervals import bootstrap, proportion, wilson
 
 ROWS = [
@@ -87,3 +89,42 @@ def test_the_bootstrap_covers_the_mean_about_as_often_as_it_says() -> None:
     assert np.isnan(bootstrap([1.0])).all()
     with pytest.raises(ValueError, match="at least one value"):
         bootstrap([])
+
+
+def test_records_are_aggregated_in_the_order_of_the_records_or_of_cells() -> None:
+    records = pd.DataFrame(
+        {"learner": ["b", "b", "a"], "dim": [2, 2, None], "recall": [0.1, 0.4, 0.9], "won": [3, 4, 5]}
+    )
+    columns = {"recall": ("recall", "mean"), "least": ("recall", "min"), "won": ("won", "sum")}
+    b = {"learner": "b", "dim": 2, "recall": 0.25, "least": 0.1, "won": 7}
+    a = {"learner": "a", "dim": None, "recall": 0.9, "least": 0.9, "won": 5}
+    assert aggregated(records, ["learner", "dim"], columns) == [b, a]
+    order = [{"learner": "a", "dim": None}, {"learner": "b", "dim": 2}]
+    assert aggregated(records, ["learner", "dim"], columns, order) == [a, b]
+
+
+def test_a_pivot_has_a_column_for_each_value_and_marks_the_best_of_each() -> None:
+    rows = [
+        {"learner": "a", "dim": 2, "recall": 0.5, "low": 0.4, "high": 0.6},
+        {"learner": "a", "dim": 3, "recall": 0.7, "low": 0.6, "high": 0.8},
+        {"learner": "b", "dim": 2, "recall": 0.9, "low": 0.8, "high": 1.0},
+    ]
+    value = Column("recall", "", ".1f", ("low", "high"), best="max")
+    table = pivot("Recall", rows, [Column("learner")], Column("dim"), value, "by dimension")
+    assert [column.title for column in table.columns] == ["learner", "2", "3"]
+    assert [[cell.text for cell in line] for line in table.cells] == [
+        ["a", "0.5 [0.4, 0.6]", "0.7 [0.6, 0.8]"],
+        ["b", "0.9 [0.8, 1.0]", "-"],
+    ]
+    assert [line[1].mark for line in table.cells] == ["", "best"]
+
+
+def test_a_table_by_measure_has_a_row_for_each_value_that_was_measured() -> None:
+    table = [{"learner": "a", "recall": 0.5, "won": None}, {"learner": "b", "recall": 0.7, "won": 3, "won_low": 2}]
+    frame = by_measure(table, {"share recalled": ["recall"], "games won": ["won", "won_low"]})
+    assert frame[["learner", "measure", "value"]].to_numpy().tolist() == [
+        ["a", "share recalled", 0.5],
+        ["b", "share recalled", 0.7],
+        ["b", "games won", 3.0],
+    ]
+    assert frame.low.fillna(0).tolist() == [0, 0, 2]

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
+import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import torch
@@ -14,12 +15,13 @@ from rich.console import Console
 
 import sim
 from behaviours import Demonstrations
+from experiments.kit import Outcome
 from experiments.kit.run import check_all, run
 from experiments.main import main
-from experiments.observability.disturbances import DISTURBANCES, HIGH, LOW, Disturbance, DisturbedPolicy
+from experiments.observability.disturbances import DISTURBANCES, HIGH, LOW, Disturbance
 from experiments.observability.learners import Learned, Task, best, compare
 from experiments.observability.memory import Memory, TeacherRuns
-from experiments.observability.page import curves, means, sentence
+from experiments.observability.results import FIGURE, means, tables
 from experiments.observability.study import Observability, cells, study
 from experiments.observability.windows import ProgramAnswer, WindowPolicy
 
@@ -45,8 +47,8 @@ def test_an_undisturbed_teacher_drives_as_the_teacher() -> None:
         return sim.Teacher()(seen[:, :3])
 
     own = drive(sim.Teacher())
-    for seen in (sim.Teacher(), WindowPolicy(of_the_present, Memory((1, 4)))):
-        through = drive(DisturbedPolicy(undisturbed, seen))
+    for answer, memory in ((sim.Teacher(), Memory()), (of_the_present, Memory((1, 4)))):
+        through = drive(WindowPolicy(undisturbed, answer, memory))
         np.testing.assert_array_equal(own.trajectory.sensors, through.trajectory.sensors)
 
 
@@ -117,33 +119,46 @@ def row(learner: str, strength: float, agreement: float, success: float | None) 
     }  # fmt: skip
 
 
-def test_sentences_follow_from_the_numbers() -> None:
+def test_means_are_over_the_strengths_above_0() -> None:
     table = [
         row("default", 0.0, 1.0, 1.0), row("default", 0.5, 0.5, None), row("default", 0.8, 0.3, 0.1),
-        row("disturbed", 0.5, 0.7, None), row("disturbed", 0.8, 0.5, 0.1), row("trace", 0.8, 0.5, 0.6),
+        row("trace", 0.8, 0.5, 0.6), row("tree", 0.5, 0.7, None),
     ]  # fmt: skip
-    assert means(table, "missing", "balanced_agreement")["default"] == pytest.approx(0.4)
-    assert means([row("tree", 0.5, 0.7, None)], "missing", "success_rate") == {}
-    told = sentence(table, "missing")
-    assert "raised from 0.40 to 0.60 by learning" in told
-    assert "lowered from 0.60 to 0.50 by `trace`" in told
-    assert "Success rate: highest for `trace` (0.60); unchanged (0.10) by learning" in told
+    found = means(table, "balanced_agreement")
+    assert found.learner.tolist() == ["default", "trace", "tree"]
+    assert found.balanced_agreement.tolist() == pytest.approx([0.4, 0.5, 0.7])
+    assert means(table, "success_rate").learner.tolist() == ["default", "trace"]
+
+
+def outcome(success: float | None) -> Outcome:
+    """What a run of two learners at one strength found."""
+    measured = {
+        "label": "0.5",
+        "agreement": 0.9,
+        "usual_share": 0.8,
+        "success_low": success,
+        "success_high": success,
+    }
+    table = [row(name, 0.5, 0.7, success) | measured for name in ("default", "tree")]
+    return Outcome(Path(), settings("learners=[default,tree]"), {}, pd.DataFrame(), table, {}, {})
 
 
 def test_the_figure_shows_success_only_if_somebody_drove() -> None:
     def titles(success: float | None) -> list[str]:
-        measured = {
-            "label": "0.5",
-            "agreement": 0.9,
-            "usual_share": 0.8,
-            "success_low": success,
-            "success_high": success,
-        }
-        figure = curves([row(name, 0.5, 0.7, success) | measured for name in ("default", "tree")])
-        return [axes.get_ylabel() for axes in figure.axes]
+        return [axes.get_ylabel() for axes in FIGURE.draw(outcome(success)).axes]
 
     assert titles(None) == ["balanced agreement", "agreement"]
     assert titles(0.5) == ["balanced agreement", "agreement", "success rate"]
+
+
+def test_a_table_of_each_disturbance_has_all_measures() -> None:
+    missing, learners = tables(outcome(0.25))
+    assert [[cell.text for cell in line] for line in missing.cells] == [
+        ["default", "0.900 / 0.70 / 0.25"],
+        ["tree", "0.900 / 0.70 / 0.25"],
+    ]
+    assert [column.title for column in missing.columns] == ["learner", "0.5"]
+    assert [line[0].text for line in learners.cells] == ["default", "tree"]
 
 
 @pytest.mark.parametrize(
@@ -262,8 +277,8 @@ def test_the_same_seed_gives_the_same_results_in_other_batches(finished: Path, t
 
 def test_without_starts_agreement_is_all_that_is_measured(tmp_path: Path) -> None:
     chosen = ("starts=0", "disturbances=[missing]", "learners=[teacher,tree]", "workers=1")
-    outcome = run(study, settings(*SMALL, *chosen), tmp_path, Console(file=io.StringIO()))
-    assert [(row["learner"], row["episodes"], row["success_rate"]) for row in outcome.table] == [
+    found = run(study, settings(*SMALL, *chosen), tmp_path, Console(file=io.StringIO()))
+    assert [(row["learner"], row["episodes"], row["success_rate"]) for row in found.table] == [
         (learner, 0, None) for learner in ("teacher", "teacher", "tree", "tree")
     ]
     assert "could not be drawn" not in (tmp_path / "report.html").read_text()
