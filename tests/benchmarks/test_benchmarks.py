@@ -52,7 +52,7 @@ def test_the_command_measures_every_work(
     compared = [row for row in rows if "exponent" not in row]
     works = {row["work"].split(",")[0] for row in compared}
     assert works == {
-        "record encoding", "clean-up", "protect", "random hypervectors", "Algorithm 1", "Algorithm 2", "rollouts",
+        "record encoding", "clean-up", "protect", "random hypervectors", "Algorithm 1", "Algorithm 2", "robot step",
         "import beyond torch",
     }  # fmt: skip
     for row in compared:
