@@ -44,12 +44,7 @@ class Engines(corral.Learning):
 def cells(settings: Engines) -> list[Cell]:
     """A cell for each controller and arena, which drives in both engines."""
     found = grid(arena=settings.arenas, controller=settings.controllers)
-    return [cell for cell in found if cell["controller"] == "teacher" or one_light(cell["arena"])]
-
-
-def one_light(arena: str) -> bool:
-    """Whether a robot that senses one light can drive there."""
-    return sim.Task.of(sim.find_arena(arena)) == sim.Task()
+    return [cell for cell in found if cell["controller"] == "teacher" or cell["arena"] in corral.arenas()]
 
 
 def prepare(settings: Engines, folder: Path, progress: Any) -> dict[str, Any]:

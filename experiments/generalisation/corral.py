@@ -36,7 +36,7 @@ from experiments.generalisation.corral_results import FIGURE, HOME, TEACHER, hea
 from experiments.kit import Cell, Part, Row, Study, part, parts, setting, settings
 from experiments.models.baselines import CLASSIFIERS, Classified
 from experiments.tasks.agreement import right
-from experiments.tasks.corral import FIRST_DEMONSTRATION, Driving, drive, drive_together, moving, shown_in
+from experiments.tasks.corral import FIRST_DEMONSTRATION, Driving, arenas, drive, drive_together, moving, shown_in
 
 
 @dataclass
@@ -66,7 +66,7 @@ class Generalisation(Driving):
         list(CLASSIFIERS), "learners without hypervectors", choices=CLASSIFIERS, distinct=True, empty=True
     )
     arenas: list[str] = setting(
-        ["default", "narrow", "offset_lamp", "large"], "`default` first, then unseen ones", choices=sim.ARENAS,
+        ["default", "narrow", "offset_lamp", "large"], "`default` first, then unseen ones", choices=arenas,
         distinct=True,
     )  # fmt: skip
     starts: int = setting(

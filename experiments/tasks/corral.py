@@ -98,7 +98,21 @@ def arena(options: parts.Options) -> sim.Arena:
     """The arena of the group `arena`."""
     made = sim.ARENAS[options["name"]]
     parts.known_only("arena", options, made)
-    return made(**{key: value for key, value in options.items() if key != "name"})
+    found = made(**{key: value for key, value in options.items() if key != "name"})
+    if not one_light(found):
+        known = ", ".join(arenas())
+        raise ValueError(f"arena={options['name']}: the robot of this study senses one light; choose from {known}")
+    return found
+
+
+def one_light(arena: sim.Arena) -> bool:
+    """Whether a robot that senses one light can drive there."""
+    return sim.Task.of(arena) == sim.Task()
+
+
+def arenas() -> list[str]:
+    """The names of the arenas with one light."""
+    return [name for name in sim.ARENAS if one_light(sim.find_arena(name))]
 
 
 def frozen(policy: sim.ControllerLike) -> sim.ControllerLike:

@@ -28,13 +28,15 @@ TEACHER_COMMANDS.flags.writeable = False
 
 
 class Teacher:
-    """The rules as a function: `teacher(sensors [B, n]) -> commands [B, 2]`, each command exactly -1 or +1.
+    """The rules as a function: `teacher(sensors [B, n]) -> commands [B, 2]`.
 
     Args:
         light_below: light is sensed if its reading is below this, m.
         obstacle_below: an obstacle is sensed if the distance is below this, m.
         task: says what the columns of the readings are.
         light: the colour of the light to go to, by default the first.
+        avoid: the command for an obstacle ahead. Turning on the spot is the paper's; `(-0.5, 1.0)`, a turn that moves
+            on, leaves more corrals (see docs/world.md).
     """
 
     def __init__(
@@ -43,11 +45,14 @@ class Teacher:
         obstacle_below: float = OBSTACLE,
         task: Task = Task(),  # noqa: B008 (frozen)
         light: str | None = None,
+        avoid: tuple[float, float] = (-1.0, 1.0),
     ) -> None:
         self.light_below = light_below
         self.obstacle_below = obstacle_below
         self.task = task
         self.pair = task.pair(task.lights[0] if light is None else light)
+        self.commands = TEACHER_COMMANDS.copy()
+        self.commands[TEACHER_RULES.index("avoid_obstacle")] = avoid
 
     def rule(self, sensors: NDArray[np.float64]) -> NDArray[np.int64]:
         """The index into `TEACHER_RULES` of the rule that fires, `[B]`.
@@ -60,7 +65,7 @@ class Teacher:
 
     def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commands `[B, 2]` for `sensors` `[B, n]`."""
-        return TEACHER_COMMANDS[self.rule(sensors)]
+        return self.commands[self.rule(sensors)]
 
 
 def sensed(
