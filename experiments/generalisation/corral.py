@@ -64,7 +64,11 @@ class Generalisation(Driving):
     rules: list[str] = setting(names(Rules), "how a program is learned", choices=names(Rules), distinct=True)
     options: Options = settings(Options, "what these names mean")
     baselines: list[str] = setting(
-        list(CLASSIFIERS), "learners without hypervectors", choices=CLASSIFIERS, distinct=True, empty=True
+        ["nearest_neighbour", "decision_tree"],
+        "learners without hypervectors",
+        choices=CLASSIFIERS,
+        distinct=True,
+        empty=True,
     )
     arenas: list[str] = setting(
         ["default", "narrow", "offset_lamp", "large"], "`default` first, then unseen ones", choices=sim.ARENAS,
