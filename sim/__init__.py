@@ -6,7 +6,7 @@ from sim.arenas.corral import corral
 from sim.channel import Channel
 from sim.controller import Controller, ControllerLike, as_controller, replay
 from sim.engines import NAMES as ENGINES
-from sim.env import CorralEscapeEnv, CorralEscapeVectorEnv, register
+from sim.env import CorralEscapeEnv, register
 from sim.result import Rollout, Steps, Summary
 from sim.robot import ACTUATORS, BODIES, CONTROL_HZ
 from sim.rollout import rollout
@@ -14,6 +14,7 @@ from sim.shapes import Box, Lamp, Pillar
 from sim.statistics import wilson
 from sim.task import SENSORS, Task
 from sim.teachers import BEHAVIOURS, TEACHER_RULES, FleeLight, InOrder, Teacher, WallFollowing
+from sim.vector_env import CorralEscapeVectorEnv
 
 __all__ = [
     "ACTUATORS",

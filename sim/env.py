@@ -1,4 +1,4 @@
-"""The Gymnasium environment `CorralEscape-v0`, for one robot or many. `import sim` registers it."""
+"""The Gymnasium environment `CorralEscape-v0`, for one robot. `import sim` registers it."""
 
 from __future__ import annotations
 
@@ -6,82 +6,15 @@ from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
-from gymnasium.vector import AutoresetMode, VectorEnv
-from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from sim.arena import Arena
-from sim.arenas import find_arena
-from sim.channel import Channel
 from sim.checks import whole_number
-from sim.engine import State, check_commands, control_steps
-from sim.engines import find_engine
+from sim.engine import State
+from sim.env_state import MAX_STEPS, EnvState, Floats, box, check_render_mode
 from sim.robot import ACTUATORS, CONTROL_HZ
 from sim.task import Task
-from sim.tracker import DWELL_SECONDS, Tracker
-
-MAX_STEPS = 60 * CONTROL_HZ
-"""Gymnasium truncates an episode after this many control steps (60 s)."""
-
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-
-def _box(channels: tuple[Channel, ...]) -> spaces.Box:
-    low, high = np.array([(channel.low, channel.high) for channel in channels]).T
-    return spaces.Box(low, high, dtype=np.float64)
-
-
-def _check_render_mode(render_mode: str | None) -> None:
-    if render_mode not in (None, "rgb_array"):
-        raise ValueError(f"render_mode {render_mode!r}; expected None or 'rgb_array'")
-
-
-class _EnvState:
-    """The state that both environments share: the robots, their episodes, and the progress of each."""
-
-    def __init__(
-        self, size: int, arena: str | Arena, body: str | None, dwell: float, engine: str, task: Task | None
-    ) -> None:
-        arena = find_arena(arena)
-        self.task = Task.of(arena) if task is None else task
-        self.task.check(arena)
-        self.slots = np.arange(size)
-        self.tracker = Tracker(size, control_steps(dwell), len(self.task.goals))
-        self.engine = find_engine(engine)(size, arena, self.task, body)
-        self.episodes = np.zeros(size, dtype=np.int64)
-
-    def reset(self, slots: NDArray[np.int64], episodes: NDArray[np.int64]) -> None:
-        self.engine.reset(slots, episodes)
-        self.tracker.reset(slots)
-        self.episodes[slots] = episodes
-
-    def check_open(self) -> None:
-        """Raise if the engine is closed."""
-        if self.engine.closed:
-            raise gymnasium.error.ClosedEnvironmentError("the environment is closed; make a new one")
-
-    def observe(self) -> State:
-        state = self.engine.observe(self.slots)
-        self.tracker.observe(self.slots, state)
-        return state
-
-    def drive(self, slots: NDArray[np.int64], action: object) -> None:
-        commands = check_commands(action, len(slots))
-        if not np.isfinite(commands).all():
-            raise ValueError(f"action {commands.tolist()}; expected finite commands in [-1, 1]")
-        self.engine.drive(slots, commands)
-
-    def info(self, state: State) -> dict[str, NDArray[Any]]:
-        return {
-            "episode": self.episodes.copy(),
-            "pose": np.stack([state.x, state.y, state.heading], axis=1),
-            "contact": state.contact,
-            "at_lamp": self.tracker.at_goal.copy(),
-            "escaped": self.tracker.escaped.copy(),
-            "success": self.tracker.success.copy(),
-        }
+from sim.tracker import DWELL_SECONDS
 
 
 class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
@@ -158,11 +91,11 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         engine: str = "vector",
         task: Task | None = None,
     ) -> None:
-        _check_render_mode(render_mode)
+        check_render_mode(render_mode)
         self.render_mode = render_mode
-        self._state = _EnvState(1, arena, body, dwell, engine, task)
-        self.observation_space = _box(self._state.task.sensors)
-        self.action_space = _box(ACTUATORS)
+        self._state = EnvState(1, arena, body, dwell, engine, task)
+        self.observation_space = box(self._state.task.sensors)
+        self.action_space = box(ACTUATORS)
         self._episode: int | None = None
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
@@ -213,95 +146,12 @@ class CorralEscapeEnv(gymnasium.Env[NDArray[Any], NDArray[Any]]):
         }
 
 
-class CorralEscapeVectorEnv(VectorEnv[NDArray[Any], NDArray[Any], NDArray[Any]]):
-    """`num_envs` independent copies of `CorralEscapeEnv`, each with the same bits as a single one.
-
-    Autoreset mode `NEXT_STEP`: the step after the last one of an episode ignores that row's action and returns the
-    first observation of its next episode, with reward 0. With `reset(seed=s)`, environment `i` plays the episodes
-    `i`, `i + num_envs`, `i + 2 * num_envs`, ... of seed `s`. `info` holds the same entries as arrays. The other
-    arguments are the same; `max_episode_steps` truncates episodes.
-    """
-
-    metadata: dict[str, Any] = {  # noqa: RUF012
-        "render_modes": ["rgb_array"],
-        "render_fps": CONTROL_HZ,
-        "autoreset_mode": AutoresetMode.NEXT_STEP,
-    }
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        max_episode_steps: int = MAX_STEPS,
-        arena: str | Arena = "default",
-        body: str | None = None,
-        dwell: float = DWELL_SECONDS,
-        render_mode: str | None = None,
-        engine: str = "vector",
-        task: Task | None = None,
-    ) -> None:
-        _check_render_mode(render_mode)
-        num_envs = whole_number("num_envs", num_envs, 1)
-        max_episode_steps = whole_number("max_episode_steps", max_episode_steps, 1)
-        self.num_envs = num_envs
-        self.render_mode = render_mode
-        self._state = _EnvState(num_envs, arena, body, dwell, engine, task)
-        self.single_observation_space = _box(self._state.task.sensors)
-        self.single_action_space = _box(ACTUATORS)
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
-        self.action_space = batch_space(self.single_action_space, num_envs)
-        self._max_episode_steps = max_episode_steps
-        self._over = np.zeros(num_envs, dtype=np.bool_)
-        self._ready = False
-
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
-        """Begin the first episode of every environment. Raises `ValueError` for any option or a bad seed."""
-        self._state.check_open()
-        if options:
-            raise ValueError(f"unknown reset options {sorted(map(str, options))}; the vector environment takes none")
-        seed = None if seed is None else whole_number("seed", seed)
-        super().reset(seed=seed)
-        self._state.engine.seed = int(self.np_random.integers(2**31)) if seed is None else seed
-        self._state.reset(self._state.slots, self._state.slots)
-        self._over[:] = False
-        self._ready = True
-        state = self._state.observe()
-        return state.sensors, self._state.info(state)
-
-    def step(self, actions: Floats) -> tuple[Floats, Floats, Flags, Flags, dict[str, Any]]:
-        """Drive each robot for one control step; a robot whose episode is over begins its next one."""
-        self._state.check_open()
-        if not self._ready:
-            raise gymnasium.error.ResetNeeded("call reset() before step()")
-        commands = check_commands(actions, self.num_envs)
-        driven, over = np.flatnonzero(~self._over), np.flatnonzero(self._over)
-        if driven.size:
-            self._state.drive(driven, commands[driven])
-        if over.size:
-            self._state.reset(over, self._state.episodes[over] + self.num_envs)
-        state = self._state.observe()
-        terminated = self._state.tracker.success.copy()
-        truncated = ~terminated & (self._state.tracker.clock >= self._max_episode_steps)
-        self._over = terminated | truncated
-        return state.sensors, terminated.astype(np.float64), terminated, truncated, self._state.info(state)
-
-    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
-        """One picture `[H, W, 3]` per environment, or None without a render mode."""
-        if self.render_mode is None:
-            return None
-        self._state.check_open()
-        return tuple(self._state.engine.picture(slot) for slot in range(self.num_envs))
-
-    def close_extras(self, **_: Any) -> None:
-        """Free the engine."""
-        self._state.engine.close()
-
-
 def register() -> None:
     """Register `CorralEscape-v0` unless it is registered already."""
     if "CorralEscape-v0" not in gymnasium.registry:
         gymnasium.register(
             id="CorralEscape-v0",
             entry_point="sim.env:CorralEscapeEnv",
-            vector_entry_point="sim.env:CorralEscapeVectorEnv",
+            vector_entry_point="sim.vector_env:CorralEscapeVectorEnv",
             max_episode_steps=MAX_STEPS,
         )

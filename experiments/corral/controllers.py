@@ -39,6 +39,7 @@ class Material:
         moving: those before the lamp was reached; all of a file, which does not say when that was.
         bank: what was learned over the codebooks of the run, see `learn`.
         examined: the teacher from the held-out starts.
+        ppo: what was trained by reward, for the row `ppo`.
     """
 
     settings: Corral
@@ -47,6 +48,7 @@ class Material:
     moving: Demonstrations
     bank: BehaviourBank
     examined: sim.Rollout
+    ppo: sim.ControllerLike | None = None
 
 
 @dataclass(frozen=True)
@@ -180,6 +182,12 @@ def classifier(name: str, material: Material) -> Classified:
     return Classified(CLASSIFIERS[name](material.settings.seed), material.train)
 
 
+def by_reward(material: Material) -> Controller:
+    """The reference that learns by reward instead of from demonstrations."""
+    assert material.ppo is not None
+    return Controller(material.ppo)
+
+
 CONTROLLERS: dict[str, Callable[[Material], Controller]] = {
     "teacher": lambda material: Controller(sim.Teacher()),
     "default": lambda material: one_program("default", material.bank["default"]),
@@ -189,7 +197,11 @@ CONTROLLERS: dict[str, Callable[[Material], Controller]] = {
     "hand_written": written_by_hand,
     "nearest_neighbour": lambda material: Controller(classifier("nearest_neighbour", material), len(material.train)),
     "decision_tree": lambda material: Controller(classifier("decision_tree", material)),
+    "mlp": lambda material: Controller(classifier("mlp", material)),
+    "ppo": by_reward,
     "random": lambda material: Controller(RandomCommands(material.settings.seed)),
 }
 CONTROLLERS |= {f"{name}_{twin}": CONTROLLERS[name] for twin in TWINS for name in ("teacher", "default")}
 """All rows by name; each is made from what it may learn from."""
+DEFAULT_ROWS = [name for name in CONTROLLERS if name != "ppo"]
+"""`ppo` needs a package of its own, and minutes."""

@@ -40,7 +40,19 @@ def prepare(settings: Corral, folder: Path, progress: Progress) -> Material:
     train.save(folder / "demonstrations.safetensors")
     bank.save(folder / "behaviours.safetensors")
     examined = corral.drive_together(settings, "teacher, held out", teacher, range(settings.starts), progress, arena)
-    return Material(settings, folder, train, moving, bank, examined)
+    ppo = train_ppo(settings, progress) if "ppo" in settings.controllers else None
+    return Material(settings, folder, train, moving, bank, examined, ppo)
+
+
+def train_ppo(settings: Corral, progress: Progress) -> sim.ControllerLike:
+    """Train the row `ppo` in the arena and the engine of the run."""
+    from experiments.models.ppo import trained  # needs a package that no other row does
+
+    bar = progress.add_task("ppo trains", total=settings.ppo_steps)
+    return trained(
+        settings.ppo_steps, settings.seed, corral.arena(settings.arena), settings.seconds,
+        progress=lambda count: progress.advance(bar, count), engine=settings.engine, body=settings.body,
+    )  # fmt: skip
 
 
 def measure(material: Material, cell: Cell) -> list[Row]:

@@ -1,10 +1,11 @@
 """What the main job can be told, and what is refused before anything is driven."""
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 import sim
 from behaviours import BehaviourBank, Demonstrations, OneShot
-from experiments.corral.controllers import CONTROLLERS, original, printed_space
+from experiments.corral.controllers import CONTROLLERS, DEFAULT_ROWS, original, printed_space
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.models import hand_written
 from experiments.tasks import corral
@@ -25,7 +26,7 @@ class Corral(corral.Learning):
     composition: Part = part("composition", "bundle", "how the row bundled combines its three behaviours")
     paper: Paper = settings(Paper, "the rows paper and paper_best_bins: the printed algorithms, read literally")
     controllers: list[str] = setting(
-        list(CONTROLLERS), "the rows of the table, in this order", choices=lambda: CONTROLLERS, distinct=True
+        DEFAULT_ROWS, "the rows of the table, in this order", choices=lambda: CONTROLLERS, distinct=True
     )
     demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
     demonstrations_file: str | None = setting(
@@ -38,6 +39,7 @@ class Corral(corral.Learning):
         [2, 3, 4, 6, 8, 12, 16], "tried for paper_best_bins, and the bins of paper", low=1, distinct=True, empty=True
     )
     validation_starts: int = setting(40, "starts to choose among them, not among the held-out ones", low=1)
+    ppo_steps: int = setting(1_000_000, "control steps of all robots together for which ppo is trained", low=1)
     animate: bool = setting(True, "draw one episode of teacher and learned robot side by side, as an animation")
 
 
@@ -56,6 +58,8 @@ def check(settings: Corral) -> None:
         parts.refuse_unsupported(parts.rule(settings.paper.rule), printed_space(settings))
     if "hand_written" in settings.controllers:
         hand_written.behaviour(space.vsa, settings.seed)
+    if "ppo" in settings.controllers and find_spec("stable_baselines3") is None:
+        raise ValueError("controllers: ppo needs stable-baselines3: pip install 'torchvsa[rl]'")
     if settings.demonstrations_file is not None:
         corral.from_file(settings.demonstrations_file)
 
@@ -69,6 +73,7 @@ PRESETS = {
         "other_starts": 20,
         "paper_bins": [2, 4],
         "validation_starts": 10,
+        "ppo_steps": 50_000,
     },
     "paper": {"defaults": [{f"override /{group}": option} for group, option in PAPER.items()]},
 }

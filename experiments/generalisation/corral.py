@@ -63,7 +63,11 @@ class Generalisation(Driving):
     rules: list[str] = setting(list(RULES), "how a program is learned", choices=RULES, distinct=True)
     options: Options = settings(Options, "what these names mean")
     baselines: list[str] = setting(
-        list(CLASSIFIERS), "learners without hypervectors", choices=CLASSIFIERS, distinct=True, empty=True
+        ["nearest_neighbour", "decision_tree"],
+        "learners without hypervectors",
+        choices=CLASSIFIERS,
+        distinct=True,
+        empty=True,
     )
     arenas: list[str] = setting(
         ["default", "narrow", "offset_lamp", "large"], "`default` first, then unseen ones", choices=arenas,
