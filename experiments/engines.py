@@ -21,6 +21,7 @@ from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Study, Ta
 from experiments.kit.figures import BLUE, VERMILION
 from experiments.kit.intervals import bootstrap
 from experiments.tasks import corral
+from sim import render
 
 MEASURES = {"success": "success", "time_to_light_s": "time to the lamp (s)", "collisions": "share of time in contact"}
 """What is compared, as means over the starts; the time of successful episodes only."""
@@ -141,6 +142,21 @@ def intervals(outcome: Outcome) -> Figure:
     return figure
 
 
+def maps(outcome: Outcome) -> Figure:
+    """The arenas from above, with paths of the teacher in `vector`."""
+    names = outcome.settings.arenas
+    figure = Figure(figsize=(12, 3.2 * -(-len(names) // 4)), layout="constrained")
+    panels = figure.subplots(-(-len(names) // 4), 4, squeeze=False).flat
+    for axes, name in zip(panels, names, strict=False):
+        arena = sim.find_arena(name)
+        shown = sim.rollout(sim.InOrder(sim.Task.of(arena)), arena, episodes=range(4), seed=outcome.settings.seed)
+        render.draw_rollout(axes, shown, legend=False)
+        axes.set_title(name)
+    for axes in panels:
+        axes.set_axis_off()
+    return figure
+
+
 TABLE = Table(
     "Both engines from the same starts",
     [
@@ -171,7 +187,15 @@ study = Study(
     summarise=summarise,
     keys=("arena", "controller", "measure"),
     table=TABLE,
-    figures=[Drawing("engines", intervals, "means and intervals of both engines, by arena and controller")],
+    figures=[
+        Drawing(
+            "arenas",
+            maps,
+            "the arenas from above, with four paths of the teacher in each",
+            "Orange: toward light; red: obstacle; blue: straight ahead. A cross marks an episode without success.",
+        ),
+        Drawing("engines", intervals, "means and intervals of both engines, by arena and controller"),
+    ],
     headline=headline,
     method=METHOD,
     presets={"quick": {"arenas": ["default", "two_lamps"], "controllers": ["teacher"], "starts": 20}},
