@@ -28,6 +28,7 @@ FIRST_VALIDATION = 2_000_000
 GROUPS["arena"] = Group(
     sim.ARENAS,
     given=frozenset({"within"}),
+    only=lambda made: one_light(made()),
     meanings={
         "side": "inner edge length of the corral, m",
         "gap": "width of an opening, m",

@@ -153,7 +153,7 @@ def test_no_worker_outlives_the_command_and_the_same_command_goes_on(
     tmp_path: Path, number: signal.Signals, code: int, words: str
 ) -> None:
     log = tmp_path / "log"
-    arguments = (f"log={log}", "repeats=16", "seconds=0.3", "names=[a]")
+    arguments = (f"log={log}", "repeats=30", "seconds=0.3", "names=[a]")
     run = command(tmp_path, *arguments)
     deadline = time.monotonic() + 120
     while not log.exists() or len(log.read_text().splitlines()) < 5:
@@ -173,12 +173,12 @@ def test_no_worker_outlives_the_command_and_the_same_command_goes_on(
         assert time.monotonic() < deadline, "a worker is left"
         time.sleep(0.1)
     done = len(only(tmp_path, "cells.jsonl").read_text().splitlines())
-    assert 0 < done < 16
+    assert 0 < done < 30
     if number != signal.SIGKILL:  # the hardest of them is enough
         return
     log.unlink()
     again = command(tmp_path, *arguments)
     printed, said = again.communicate(timeout=120)
     assert again.returncode == 0, said
-    assert f"{done} of 16 cells" in printed
-    assert len(log.read_text().splitlines()) == 16 - done
+    assert f"{done} of 30 cells" in printed
+    assert len(log.read_text().splitlines()) == 30 - done
