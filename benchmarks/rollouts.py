@@ -56,7 +56,7 @@ def cases(device: str, small: bool = False) -> Iterator[Case]:
 
 def environments(learned: Callable[[Any], Any], small: bool) -> Iterator[Case]:
     """The vector environment beside Gymnasium's over single ones."""
-    robots, ticks = (2, 3) if small else (64, 40)
+    robots, ticks = (2, 3) if small else (16, 40)  # each of the peer's is a process
     ours = sim.CorralEscapeVectorEnv(robots)
     many = sim.CorralEscapeVectorEnv(8 if small else SOME)
     peer = AsyncVectorEnv([partial(Own, episode) for episode in range(robots)])
