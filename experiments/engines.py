@@ -147,7 +147,7 @@ def maps(outcome: Outcome) -> Figure:
     names = outcome.settings.arenas
     figure = Figure(figsize=(12, 3.2 * -(-len(names) // 4)), layout="constrained")
     panels = figure.subplots(-(-len(names) // 4), 4, squeeze=False).flat
-    for axes, name in zip(panels, names, strict=False):
+    for name, axes in zip(names, panels, strict=False):  # names first: what is left of the panels stays empty
         arena = sim.find_arena(name)
         shown = sim.rollout(sim.InOrder(sim.Task.of(arena)), arena, episodes=range(4), seed=outcome.settings.seed)
         render.draw_rollout(axes, shown, legend=False)
