@@ -25,7 +25,6 @@ from sim import render
 
 MEASURES = {"success": "success", "time_to_light_s": "time to the lamp (s)", "collisions": "share of time in contact"}
 """What is compared, as means over the starts; the time of successful episodes only."""
-ENGINES = ("vector", "bullet")
 
 
 @dataclass
@@ -50,8 +49,7 @@ def cells(settings: Engines) -> list[Cell]:
 
 def prepare(settings: Engines, folder: Path, progress: Any) -> dict[str, Any]:
     """Let the teacher demonstrate in the default arena, and learn."""
-    first = corral.FIRST_DEMONSTRATION
-    episodes = range(first, first + settings.demonstrations)
+    episodes = range(corral.FIRST_DEMONSTRATION, corral.FIRST_DEMONSTRATION + settings.demonstrations)
     train = corral.moving(corral.drive_together(settings, "teacher demonstrates", sim.Teacher(), episodes, progress))
     space, rule, fires = corral.space(settings), parts.rule(settings.rule), sim.Teacher().rule(train.sensors.numpy())
     bank = BehaviourBank(space)
@@ -68,16 +66,16 @@ def measure(material: dict[str, Any], cell: Cell) -> list[Row]:
     controller = sim.InOrder(sim.Task.of(arena)) if name == "teacher" else material[name]
     runs = [
         corral.drive(replace(settings, engine=engine), controller, range(settings.starts), arena, record=True)
-        for engine in ENGINES
+        for engine in sim.ENGINES
     ]
     rows = []
     for episode in range(settings.starts):
         apart = before_touch(arena, *(run.slice(episode) for run in runs))
-        for engine, run in zip(ENGINES, runs, strict=True):
-            columns = run.success, run.time_to_light, run.collisions
-            success, seconds, collisions = (column[episode].item() for column in columns)
-            row = {"engine": engine, "episode": episode, "success": float(success), "collisions": collisions}
-            rows.append({**row, "time_to_light_s": seconds if success else None, "apart_m": apart})
+        for engine, run in zip(sim.ENGINES, runs, strict=True):
+            success, seconds = float(run.success[episode]), float(run.time_to_light[episode])
+            row = {"engine": engine, "episode": episode, "success": success, "apart_m": apart}
+            row |= {"collisions": float(run.collisions[episode]), "time_to_light_s": seconds if success else None}
+            rows.append(row)
     return rows
 
 
@@ -98,7 +96,7 @@ def summarise(settings: Engines, records: pd.DataFrame) -> list[Row]:
         own = records[(records.arena == cell["arena"]) & (records.controller == cell["controller"])]
         for measured in MEASURES:
             row = {**cell, "measure": measured}
-            for engine in ENGINES:
+            for engine in sim.ENGINES:
                 values = own.loc[own.engine == engine, measured].dropna().to_numpy()
                 low, high = bootstrap(values) if len(values) > 1 else (None, None)
                 row |= {engine: values.mean() if len(values) else None, f"{engine}_low": low, f"{engine}_high": high}
@@ -108,10 +106,10 @@ def summarise(settings: Engines, records: pd.DataFrame) -> list[Row]:
 
 def agree(row: Row) -> bool:
     """Whether each engine's mean is in the other's interval."""
-    if any(row[f"{engine}_low"] is None for engine in ENGINES):
+    pairs = (sim.ENGINES, sim.ENGINES[::-1])
+    if any(row[f"{engine}_low"] is None for engine in sim.ENGINES):
         return row["vector"] == row["bullet"]
-    within = [row[f"{other}_low"] <= row[engine] <= row[f"{other}_high"] for engine, other in (ENGINES, ENGINES[::-1])]
-    return all(within)
+    return all(row[f"{other}_low"] <= row[engine] <= row[f"{other}_high"] for engine, other in pairs)
 
 
 def headline(outcome: Outcome) -> str:
@@ -129,7 +127,7 @@ def intervals(outcome: Outcome) -> Figure:
     panels = figure.subplots(1, len(MEASURES), sharey=True)
     for axes, (measured, title) in zip(panels, MEASURES.items(), strict=True):
         rows = [row for row in outcome.table if row["measure"] == measured]
-        for engine, colour, shift in zip(ENGINES, (BLUE, VERMILION), (-0.15, 0.15), strict=True):
+        for engine, colour, shift in zip(sim.ENGINES, (BLUE, VERMILION), (-0.15, 0.15), strict=True):
             for place, row in enumerate(rows):
                 if row[engine] is not None:
                     axes.plot([row[f"{engine}_low"], row[f"{engine}_high"]], [place + shift] * 2, color=colour)
