@@ -51,10 +51,10 @@ def prepare(settings: Engines, folder: Path, progress: Any) -> dict[str, Any]:
     """Let the teacher demonstrate in the default arena, and learn."""
     episodes = range(corral.FIRST_DEMONSTRATION, corral.FIRST_DEMONSTRATION + settings.demonstrations)
     train = corral.moving(corral.drive_together(settings, "teacher demonstrates", sim.Teacher(), episodes, progress))
-    space, rule, fires = corral.space(settings), parts.rule(settings.rule), sim.Teacher().rule(train.sensors.numpy())
+    space, rule = corral.space(settings), parts.rule(settings.rule)
     bank = BehaviourBank(space)
-    for name, rules in sim.BEHAVIOURS.items():
-        bank.learn(name, train.where(np.isin(fires, rules)), rule)
+    for name, samples in corral.by_behaviour(train).items():
+        bank.learn(name, samples, rule)
     learned = {"default": rule.fit(space, train), "bundled": parts.policy(bank, settings.composition)}
     return {"settings": settings, **learned}
 

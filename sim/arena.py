@@ -66,9 +66,14 @@ class Arena:
         if self.wheel_noise < 0:
             raise ValueError(f"Arena.wheel_noise is {self.wheel_noise}; expected a fraction of the speed, 0 or more")
 
+    @property
+    def solids(self) -> Shapes:
+        """All that a robot can touch: obstacles and lamps."""
+        return Shapes([*self.obstacles, *self.lamps])
+
     def touched(self, x: Floats, y: Floats) -> NDArray[np.bool_]:
         """Whether robots at these positions touch an obstacle or a lamp, `[B]`."""
-        return Shapes([*self.obstacles, *self.lamps]).distance(x, y) - RADIUS <= TOUCH
+        return self.solids.distance(x, y) - RADIUS <= TOUCH
 
     def extent(self) -> tuple[float, float, float, float]:
         """The smallest and the largest x, the smallest and the largest y of all that there is, m."""
@@ -118,6 +123,13 @@ def walls(floor: Box, gaps: Iterable[tuple[float, float]] = (), thickness: float
     return around + [Box(right + thick, (low + high) / 2, thick, (high - low) / 2) for low, high in pieces]
 
 
+def square(side: float, gaps: Iterable[tuple[float, float]]) -> tuple[list[Box], Box, Box]:
+    """Walls, floor and outline of a square corral, centred on the origin, with `gaps` as in `walls`."""
+    half = side / 2
+    floor, outline = Box(0.0, 0.0, half, half), Box(0.0, 0.0, half + WALL_THICKNESS, half + WALL_THICKNESS)
+    return walls(floor, gaps), floor, outline
+
+
 def draw_episodes(arena: Arena, seed: int, episodes: Iterable[int]) -> tuple[Floats, list[np.random.Generator]]:
     """Draw the starts `[B, 3]` (x, y, heading) of episodes, and the generators that draw their wheel noise.
 
@@ -128,7 +140,7 @@ def draw_episodes(arena: Arena, seed: int, episodes: Iterable[int]) -> tuple[Flo
     """
     seed = whole_number("seed", seed)
     generators = [np.random.default_rng([seed, whole_number("episode", episode)]) for episode in episodes]
-    floor, margin, solids = arena.floor, arena.start_margin, Shapes([*arena.obstacles, *arena.lamps])
+    floor, margin, solids = arena.floor, arena.start_margin, arena.solids
     middle = np.array([floor.x, floor.y, 0.0])
     reach = np.array([floor.half_x - margin, floor.half_y - margin, math.pi])
     starts, open_rows = np.empty((len(generators), 3)), np.arange(len(generators))

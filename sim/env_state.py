@@ -15,7 +15,7 @@ from sim.channel import Channel
 from sim.engine import State, check_commands, control_steps
 from sim.engines import find_engine
 from sim.robot import CONTROL_HZ
-from sim.task import Task
+from sim.task import Task, find_task
 from sim.tracker import Tracker
 
 MAX_STEPS = 60 * CONTROL_HZ
@@ -44,8 +44,7 @@ class EnvState:
         self, size: int, arena: str | Arena, body: str | None, dwell: float, engine: str, task: Task | None
     ) -> None:
         arena = find_arena(arena)
-        self.task = Task.of(arena) if task is None else task
-        self.task.check(arena)
+        self.task = find_task(task, arena)
         self.slots = np.arange(size)
         self.tracker = Tracker(size, control_steps(dwell), len(self.task.goals))
         self.engine = find_engine(engine)(size, arena, self.task, body)

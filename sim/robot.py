@@ -10,6 +10,8 @@ MAX_SPEED = 0.4
 """Speed of a wheel at command 1, m/s."""
 CONTROL_HZ = 20
 """Control steps per second."""
+SUBSTEPS = 2
+"""Steps of motion of the planar body per control step."""
 TOUCH = 0.005
 """A robot touches a wall or a lamp if the gap between their outlines is at most this wide, m."""
 

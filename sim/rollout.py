@@ -22,7 +22,7 @@ from sim.engines import find_engine
 from sim.result import Rollout, Steps
 from sim.robot import ACTUATORS
 from sim.state import rows_of
-from sim.task import Task
+from sim.task import Task, find_task
 from sim.tracker import DWELL_SECONDS, Tracker
 
 
@@ -87,12 +87,10 @@ def rollout(
             Commands that are not finite or have the wrong shape; the message names episode and step.
     """
     numbers, chosen, where = _check_episodes(episodes), find_engine(engine), find_arena(arena)
-    task = Task.of(where) if task is None else task
-    task.check(where)
     job = _Job(
         as_controller(policy),
         where,
-        task,
+        find_task(task, where),
         engine,
         chosen.find_body(body),
         whole_number("seed", seed),

@@ -53,5 +53,12 @@ class Task:
         return first, first + 1
 
 
+def find_task(task: Task | None, arena: Arena) -> Task:
+    """A task, by default `Task.of(arena)`. Raises `ValueError` for a goal that the arena does not have."""
+    found = Task.of(arena) if task is None else task
+    found.check(arena)
+    return found
+
+
 SENSORS = Task().sensors
 """The readings of a robot that senses one light, in order."""

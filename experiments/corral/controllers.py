@@ -7,9 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-import torch
-
 import sim
 import torchvsa
 from behaviours import Behaviour, BehaviourBank, Demonstrations, LearningReport, Policy, Space
@@ -112,12 +109,8 @@ def learn(settings: Corral, train: Demonstrations) -> BehaviourBank:
     if "default" in map(original, settings.controllers):
         bank.learn("default", train, rule)
     if "bundled" in settings.controllers:
-        fires = sim.Teacher().rule(train.sensors.numpy())
-        for name, rules in sim.BEHAVIOURS.items():
-            chosen = torch.from_numpy(np.isin(fires, rules))
-            if not chosen.any():
-                raise ValueError(f"no demonstration shows {name!r}; give it more of them (demonstrations=...)")
-            bank.learn(name, train.where(chosen), rule)
+        for name, samples in corral.by_behaviour(train).items():
+            bank.learn(name, samples, rule)
     return bank
 
 

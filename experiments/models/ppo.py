@@ -187,7 +187,7 @@ def trained(
 @contextmanager
 def alone() -> Iterator[None]:
     """Work on one thread, and keep the global random states, which stable-baselines3 seeds and draws from."""
-    threads, states = torch.get_num_threads(), (random.getstate(), np.random.get_state())  # noqa: NPY002
+    threads, states = torch.get_num_threads(), (random.getstate(), np.random.get_state())  # noqa: NPY002 (which stable-baselines3 uses)
     torch.set_num_threads(1)
     try:
         with torch.random.fork_rng(devices=[]):
@@ -195,4 +195,4 @@ def alone() -> Iterator[None]:
     finally:
         torch.set_num_threads(threads)
         random.setstate(states[0])
-        np.random.set_state(states[1])  # noqa: NPY002
+        np.random.set_state(states[1])  # noqa: NPY002 (which stable-baselines3 uses)

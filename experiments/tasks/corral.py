@@ -97,7 +97,9 @@ def space(settings: Learning, bins: int | None = None) -> Space:
 
 def arena(options: parts.Options) -> sim.Arena:
     """The arena of the group `arena`."""
-    made = sim.ARENAS[options["name"]]
+    made = sim.ARENAS.get(options["name"])
+    if made is None:
+        raise ValueError(f"there is no arena {options['name']!r}; choose from {', '.join(arenas())}")
     parts.known_only("arena", options, made)
     found = made(**{key: value for key, value in options.items() if key != "name"})
     if not one_light(found):
@@ -171,6 +173,19 @@ def moving(rollout: sim.Rollout) -> Demonstrations:
     """The control steps before the lamp: a robot at rest repeats one condition and would flatter every learner."""
     shown, before = shown_in(rollout)
     return shown.where(before)
+
+
+def by_behaviour(shown: Demonstrations) -> dict[str, Demonstrations]:
+    """The samples of each of the teacher's behaviours, those in which its rules fire.
+
+    Raises `ValueError` for a behaviour without any.
+    """
+    fires = sim.Teacher().rule(shown.sensors.numpy())
+    found = {name: shown.where(np.isin(fires, rules)) for name, rules in sim.BEHAVIOURS.items()}
+    for name, samples in found.items():
+        if not len(samples):
+            raise ValueError(f"no demonstration shows {name!r}; give it more of them (demonstrations=...)")
+    return found
 
 
 def from_file(path: str | Path) -> Demonstrations:

@@ -5,7 +5,7 @@ The teacher solves `default`; each of the others is harder in one respect.
 
 from functools import partial
 
-from sim.arena import WALL_THICKNESS, Arena, walls
+from sim.arena import Arena, square
 from sim.arenas.registry import ARENAS
 from sim.shapes import Box, Lamp, Pillar
 
@@ -34,10 +34,8 @@ def corral(
         wheel_noise: see `Arena`.
         within: obstacles inside.
     """
-    floor = Box(0.0, 0.0, side / 2, side / 2)
-    outline = Box(0.0, 0.0, side / 2 + WALL_THICKNESS, side / 2 + WALL_THICKNESS)
+    around, floor, outline = square(side, [(gap_offset, gap)])
     lamp = Lamp(side / 2 + lamp_beyond, gap_offset + lamp_offset, lamp_radius)
-    around = walls(floor, [(gap_offset, gap)])
     return Arena((*around, *within), (lamp,), floor, outline, start_margin, wheel_noise)
 
 

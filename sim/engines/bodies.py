@@ -12,7 +12,7 @@ from typing import Protocol
 
 from sim.arena import Start
 from sim.engines._pybullet import pybullet
-from sim.robot import CONTROL_HZ, RADIUS, TRACK
+from sim.robot import CONTROL_HZ, RADIUS, SUBSTEPS, TRACK
 
 WHEEL_RADIUS = 0.04
 """Radius of the wheels of the wheeled body, m."""
@@ -54,12 +54,10 @@ class PlanarBody:
     neither tilts, rises nor sinks. It has no friction: contacts stop and deflect it, but never turn it.
     """
 
-    _SUBSTEPS = 2
-
     def __init__(self, client: int) -> None:
         self._client = client
         pybullet.setPhysicsEngineParameter(
-            fixedTimeStep=1 / (CONTROL_HZ * self._SUBSTEPS),
+            fixedTimeStep=1 / (CONTROL_HZ * SUBSTEPS),
             numSolverIterations=10,
             deterministicOverlappingPairs=1,
             physicsClientId=client,
@@ -106,12 +104,12 @@ class PlanarBody:
         """Turn the wheels at these speeds (m/s) for one control step. Returns the pose after it."""
         client, body = self._client, self.id
         speed, turn = (left + right) / 2, (right - left) / TRACK
-        step = turn / (CONTROL_HZ * self._SUBSTEPS)
+        step = turn / (CONTROL_HZ * SUBSTEPS)
         # Each physics step goes straight along the middle heading of its arc.
         heading = math.atan2(self._pose[3], self._pose[2]) + step / 2
         # Contact normals are horizontal only up to rounding, which would sink the body by millimetres in minutes.
         rise = self._sunk * CONTROL_HZ
-        for _ in range(self._SUBSTEPS):
+        for _ in range(SUBSTEPS):
             velocity = (speed * math.cos(heading), speed * math.sin(heading), rise)
             pybullet.resetBaseVelocity(body, velocity, (0.0, 0.0, turn), client)
             pybullet.stepSimulation(client)

@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from sim.arena import Arena, Start
 from sim.engine import Engine, Floats, Integers, Poses
-from sim.robot import CONTROL_HZ, RADIUS, TRACK
+from sim.robot import CONTROL_HZ, RADIUS, SUBSTEPS, TRACK
 from sim.shapes import Shapes
 from sim.task import Task
 
-SUBSTEPS = 2
-"""Steps of motion per control step, as many as the planar body in bullet makes."""
 PUSHES = 8
 """How often a robot is pushed out of what it has entered most, at most: in a corner each push leads into the other
 wall, by less each time."""
@@ -35,7 +33,7 @@ class Vector(Engine):
         super().__init__(size, arena, task, body, seed)
         self._x, self._y, self._heading = np.zeros((3, size))
         self._cos, self._sin, self._clear = np.ones(size), np.zeros(size), np.zeros(size)
-        self._solids = Shapes([*arena.obstacles, *arena.lamps])
+        self._solids = arena.solids
         self._lamps = Shapes(arena.lamps)
 
     def _place(self, slots: Integers, starts: Floats) -> None:

@@ -43,7 +43,7 @@ class Teacher:
         self,
         light_below: float = LIGHT_MAX,
         obstacle_below: float = OBSTACLE,
-        task: Task = Task(),  # noqa: B008 (frozen)
+        task: Task = Task(),
         light: str | None = None,
         avoid: tuple[float, float] = (-1.0, 1.0),
     ) -> None:

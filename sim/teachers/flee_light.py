@@ -16,7 +16,7 @@ class FleeLight:
     `teacher(sensors [B, n]) -> commands [B, 2]`. `light` is the colour to flee from, by default the first of the task.
     """
 
-    def __init__(self, task: Task = Task(), light: str | None = None) -> None:  # noqa: B008 (frozen)
+    def __init__(self, task: Task = Task(), light: str | None = None) -> None:
         self.task = task
         self.pair = task.pair(task.lights[0] if light is None else light)
 

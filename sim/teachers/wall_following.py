@@ -18,7 +18,7 @@ class WallFollowing:
     `teacher(sensors [B, n]) -> commands [B, 2]`. Light is ignored.
     """
 
-    def __init__(self, task: Task = Task()) -> None:  # noqa: B008 (frozen)
+    def __init__(self, task: Task = Task()) -> None:
         self.task = task
 
     def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
