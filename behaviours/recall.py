@@ -34,6 +34,11 @@ class Recall(NamedTuple):
             self.commands[index], self.similarity[index], self.margin[index], self.familiarity[index], speaker
         )
 
+    def joined(self, other: "Recall") -> "Recall":
+        """These answers, followed by those of `other`."""
+        columns = zip(self, other, strict=True)
+        return Recall(*(None if mine is None or more is None else torch.cat([mine, more]) for mine, more in columns))
+
     def mask_unobserved(self, rows: Any) -> "Recall":
         """Replace these rows: commands by NaN; similarity, margin and familiarity by 0; speaker by -1."""
         return Recall(

@@ -196,5 +196,5 @@ CONTROLLERS: dict[str, Callable[[Material], Controller]] = {
 }
 CONTROLLERS |= {f"{name}_{twin}": CONTROLLERS[name] for twin in TWINS for name in ("teacher", "default")}
 """All rows by name; each is made from what it may learn from."""
-DEFAULT_ROWS = [name for name in CONTROLLERS if name != "ppo"]
-"""`ppo` needs a package of its own, and minutes."""
+DEFAULT_ROWS = [name for name in CONTROLLERS if name not in ("ppo", "default_wheeled")]
+"""`ppo` needs a package of its own, and minutes; wheels cost more time than all other rows together."""

@@ -13,10 +13,12 @@ from rich.progress import Progress
 
 import sim
 from behaviours import Actuator, Behaviour, Demonstrations, Schema, Sensor, Space
+from behaviours.controller import Controller
 from experiments.kit import Part, Settings, part, parts, setting
 from experiments.kit.intervals import proportion
 from experiments.kit.options import GROUPS, Group
 from experiments.kit.pool import processes
+from experiments.tasks.asked_once import AskedOnce
 
 COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
@@ -119,13 +121,19 @@ def arenas() -> list[str]:
 
 
 def frozen(policy: sim.ControllerLike) -> sim.ControllerLike:
-    """The form in which a policy drives: frozen, if it is a behaviour whose program holds integers.
+    """The form in which a policy is asked: frozen, if it is a behaviour whose program holds integers.
 
     The frozen form of such a behaviour gives the same bits, and is faster.
     """
     if isinstance(policy, Behaviour) and not (policy.program.is_floating_point() or policy.program.is_complex()):
         return policy.freeze()
     return policy
+
+
+def driving(policy: sim.ControllerLike) -> sim.ControllerLike:
+    """What drives in place of a policy: its answers, each asked once in the `frozen` form, where that is possible."""
+    fastest = frozen(policy)
+    return AskedOnce(fastest) if isinstance(fastest, Controller) and AskedOnce.possible(fastest) else fastest
 
 
 def drive(
@@ -137,7 +145,7 @@ def drive(
 ) -> sim.Rollout:
     """Drive in this process, as a cell does."""
     return sim.rollout(
-        frozen(policy), arena, settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
+        driving(policy), arena, settings.body, episodes, settings.seed, settings.seconds, robots=settings.robots,
         record=record, engine=settings.engine,
     )  # fmt: skip
 

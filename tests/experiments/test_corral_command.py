@@ -132,4 +132,4 @@ def test_an_optimiser_is_given_the_success_of_the_default() -> None:
 def test_a_cell_for_each_controller_and_the_slowest_first() -> None:
     cells = [cell["controller"] for cell in study.cells(settings())]
     assert sorted(cells) == sorted(settings().controllers)
-    assert cells[:2] == ["default_wheeled", "teacher_wheeled"]
+    assert cells[:2] == ["teacher_wheeled", "default_bullet"]

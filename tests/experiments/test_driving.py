@@ -1,4 +1,6 @@
-"""Behaviours of integers drive frozen, with the same bits; the pool gives the same rollout as one process."""
+"""Programs of integers drive frozen, each condition asked once; the pool gives the rollout of one process."""
+
+import copy
 
 import numpy as np
 import torch
@@ -6,11 +8,13 @@ from kits import composed
 from rich.progress import Progress
 
 import sim
-from behaviours import Behaviour, Gradient
+from behaviours import Behaviour, BehaviourBank, Bundle, Demonstrations, Gradient, OneShot, Space
 from behaviours.frozen import FrozenBehaviour
 from behaviours.learning import no_convergence_warnings
 from experiments.corral import study
 from experiments.tasks import corral
+from experiments.tasks.asked_once import AskedOnce
+from torchvsa.encoders import History
 
 
 def learned(gradient: bool = False) -> Behaviour:
@@ -36,6 +40,37 @@ def test_floats_drive_as_they_are() -> None:
     assert corral.frozen(behaviour) is behaviour
     teacher = sim.Teacher()
     assert corral.frozen(teacher) is teacher
+
+
+def test_each_condition_is_asked_once() -> None:
+    behaviour = learned()
+    bank = BehaviourBank(behaviour.space)
+    bank.add("all", behaviour)
+    rows = torch.rand(300, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    rows[::50] = torch.nan
+    for controller in (behaviour, behaviour.freeze(), Bundle(bank)):
+        asked: list[int] = []
+        answer = controller.answer
+        controller.answer = lambda cells, answer=answer, asked=asked: (asked.append(len(cells)), answer(cells))[1]  # pyright: ignore[reportAttributeAccessIssue]
+        once = AskedOnce(controller)
+        for _ in range(2):
+            found, right = once(rows.numpy()), answer(controller.space.cells(rows))
+            for column in ("commands", "similarity", "margin", "familiarity"):
+                assert torch.equal(getattr(found, column).nan_to_num(9.0), getattr(right, column).nan_to_num(9.0))
+            if isinstance(controller, Bundle):
+                assert torch.equal(torch.as_tensor(found.speaker), torch.as_tensor(right.speaker))
+        assert asked == [len(controller.space.cells(rows).unique(dim=0))]
+
+
+def test_what_has_a_memory_is_asked_at_every_step() -> None:
+    behaviour = learned()
+    memory = History(copy.deepcopy(behaviour.space.encoder), [1, 2], seed=0)
+    space = Space(corral.schema(), memory)
+    remembering = OneShot().fit(space, Demonstrations([[0.1, 0.2, 0.3]], [[1.0, 1.0]], [0]))
+    assert AskedOnce.possible(behaviour)
+    assert not AskedOnce.possible(remembering)
+    assert not AskedOnce.possible(sim.Teacher())
+    assert isinstance(corral.driving(remembering), FrozenBehaviour)
 
 
 def test_driving_together_gives_the_bits_of_one_process() -> None:
