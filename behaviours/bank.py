@@ -1,6 +1,6 @@
 """A collection of named behaviours over one space."""
 
-from collections.abc import Iterator, Sized
+from collections.abc import Iterator, Mapping, Sized
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -12,9 +12,9 @@ from torch import Tensor, nn
 from behaviours.algebra import terms_from_dicts, terms_to_dicts
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient, Rule, require_rule
+from behaviours.learning import ErrorDriven, Gradient, Rule, require_rule
 from behaviours.memory import check_levels
-from behaviours.progress import Progress, no_progress
+from behaviours.progress import Progress, no_progress, subrange
 from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
 from behaviours.space import Space
@@ -36,7 +36,12 @@ class BehaviourBank(nn.Module):
         self._behaviours = nn.ModuleList()
 
     def learn(
-        self, name: str, demonstrations: Demonstrations, rule: Rule | None = None, progress: Progress = no_progress
+        self,
+        name: str,
+        demonstrations: Demonstrations,
+        rule: Rule | None = None,
+        progress: Progress = no_progress,
+        silent: Demonstrations | None = None,
     ) -> LearningReport:
         """Learn a behaviour and keep it under `name`, where it replaces an existing one.
 
@@ -45,16 +50,55 @@ class BehaviourBank(nn.Module):
             demonstrations: What to learn.
             rule: The learning rule; by default `Gradient()`.
             progress: Called with the completed fraction of the work, from 0 to 1.
+            silent: Readings on which the behaviour is to have no opinion, see `Rule.fit_beside`.
 
         Returns:
             What the rule did with the samples.
+
+        Raises:
+            ValueError: For `silent` with a rule that cannot keep silence.
         """
         check_name(name)
         rule = Gradient() if rule is None else rule
         require_rule(rule)
-        behaviour = rule.fit(self.space, demonstrations, progress)
+        if silent is None:
+            behaviour = rule.fit(self.space, demonstrations, progress)
+        else:
+            behaviour = rule.fit_beside(self.space, demonstrations, silent, progress)
         self.add(name, behaviour)
-        return behaviour.report
+        return self[name].report
+
+    def learn_apart(
+        self,
+        shown: Mapping[str, Demonstrations],
+        rule: Rule | Mapping[str, Rule] | None = None,
+        silence: bool = True,
+        progress: Progress = no_progress,
+    ) -> None:
+        """Learn several behaviours so that their plain sum answers as if it had been learned from all of them at once.
+
+        Each is learned from its own demonstrations. With `silence` it is also told which conditions the others know,
+        but never their commands, and learns to have no opinion there; ties between behaviours that know the same
+        condition are decided by `evidence` (see `ErrorDriven`), and by a louder `margin` of those that take precedence.
+
+            rule = ErrorDriven(margin=5, evidence=1)
+            bank.learn_apart(shown, {"seek": rule, "avoid": replace(rule, margin=8)})
+            both = bank["seek"] + bank["avoid"]
+
+        Args:
+            shown: The demonstrations of each behaviour, by name.
+            rule: One rule, or one for each name; by default `ErrorDriven(margin=5, evidence=1)`.
+            silence: Whether each behaviour is silent on conditions that only others know.
+            progress: Called with the completed fraction of the work, from 0 to 1.
+        """
+        rules = rule if isinstance(rule, Mapping) else dict.fromkeys(shown, rule or ErrorDriven(margin=5, evidence=1))
+        if missing := [name for name in shown if name not in rules]:
+            raise ValueError(f"there is no rule for {missing[0]!r}; the rules are for {', '.join(rules)}")
+        for number, (name, own) in enumerate(shown.items()):
+            others = [part for other, part in shown.items() if other != name]
+            silent = Demonstrations.join(others) if silence and others else None
+            part = subrange(progress, number / len(shown), (number + 1) / len(shown))
+            self.learn(name, own, rules[name], part, silent)
 
     def partial_fit(
         self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = no_progress

@@ -36,8 +36,10 @@ class Recall(NamedTuple):
 
     def joined(self, other: "Recall") -> "Recall":
         """These answers, followed by those of `other`."""
-        columns = zip(self, other, strict=True)
-        return Recall(*(None if mine is None or more is None else torch.cat([mine, more]) for mine, more in columns))
+        mine, more = list(self[:4]), list(other[:4])
+        if self.speaker is not None and other.speaker is not None:
+            mine, more = [*mine, self.speaker], [*more, other.speaker]
+        return Recall(*map(torch.cat, zip(mine, more, strict=True)))
 
     def mask_unobserved(self, rows: Any) -> "Recall":
         """Replace these rows: commands by NaN; similarity, margin and familiarity by 0; speaker by -1."""

@@ -26,6 +26,9 @@ class Rule(ABC):
     supports_partial_fit: ClassVar[bool] = False
     """Whether `partial_fit` works, at least with some options of the rule."""
 
+    supports_silence: ClassVar[bool] = False
+    """Whether `fit_beside` works."""
+
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
         """Whether the rule can train programs of this architecture."""
@@ -46,6 +49,23 @@ class Rule(ABC):
         Raises:
             ValueError: For readings or commands that are not valid.
         """
+
+    def fit_beside(
+        self, space: Space, demonstrations: Demonstrations, silent: Demonstrations, progress: Progress = no_progress
+    ) -> "Behaviour":
+        """Learn a behaviour that has no opinion where others have one.
+
+        Args:
+            space: As in `fit`.
+            demonstrations: As in `fit`.
+            silent: What the others were shown. Only its readings are used, never its commands: where they are not among
+                the demonstrated conditions, every result is to score about 0.
+            progress: As in `fit`.
+
+        Raises:
+            ValueError: If the rule cannot keep silence.
+        """
+        raise ValueError(f"{self.name!r} cannot keep silence; take ErrorDriven or LeastSquares")
 
     def partial_fit(
         self, behaviour: "Behaviour", demonstrations: Demonstrations, progress: Progress = no_progress

@@ -6,20 +6,19 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import torch
-from jaxtyping import Bool, Float64, Int64, Shaped
+from jaxtyping import Shaped
 from torch import Tensor
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule, continued
-from behaviours.learning.conditions import LazyConditions
 from behaviours.learning.convergence import warn_if_wrong
+from behaviours.learning.pairs import BLOCK, Pairs
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import as_bool, as_float, as_int, set_fields
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
-from torchvsa import VSA, Readout
-from torchvsa._numerics import as_bipolar, is_integer, norms
+from torchvsa._numerics import as_bipolar, is_integer
 
 
 @dataclass(frozen=True)
@@ -42,6 +41,11 @@ class ErrorDriven(Rule):
     the last `patience` epochs, that recalls the fewest pairs wrongly; otherwise it is the last program. (With
     `patience` above half of `epochs`, training never ends early.)
 
+    `evidence` makes what was shown often louder: the margin of a pair whose condition was shown n times is
+    `margin + evidence · log(1 + n)`. Of behaviours that are learned apart and added, the one that has seen more of a
+    condition then decides. A larger `margin` than that of the others gives a behaviour precedence over them. On
+    `silent` conditions, every result is kept within half of the score of a stored pair from 0.
+
     `contradictions` says which result a condition shown with several is trained on: the `"first"` (as in the paper),
     the `"majority"` (ties are broken by first appearance), or the `"latest"`.
 
@@ -51,18 +55,21 @@ class ErrorDriven(Rule):
 
     name = "error_driven"
     supports_partial_fit = True
+    supports_silence = True
 
     margin: float = 0.5
     epochs: int = 200
     contradictions: Contradictions = "majority"
     average: bool = False
     patience: int = 30
+    evidence: float = 0.0
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions)
         set_fields(
             self,
             margin=as_float("margin", self.margin, 0),
+            evidence=as_float("evidence", self.evidence, 0),
             epochs=as_int("epochs", self.epochs, 1),
             average=as_bool("average", self.average),
             patience=as_int("patience", self.patience, 1),
@@ -71,6 +78,13 @@ class ErrorDriven(Rule):
     def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """Learn a behaviour, see `Rule.fit`."""
         samples = Samples.of(space, demonstrations, subrange(progress, 0, _ENCODING_SHARE))
+        return self._learn(space, samples, None, progress)
+
+    def fit_beside(
+        self, space: Space, demonstrations: Demonstrations, silent: Demonstrations, progress: Progress = no_progress
+    ) -> Behaviour:
+        """Learn a behaviour that is silent where others have an opinion, see `Rule.fit_beside`."""
+        samples = Samples.of(space, demonstrations, subrange(progress, 0, _ENCODING_SHARE), silent)
         return self._learn(space, samples, None, progress)
 
     def partial_fit(
@@ -85,7 +99,8 @@ class ErrorDriven(Rule):
 
     def _learn(self, space: Space, samples: Samples, before: Behaviour | None, progress: Progress) -> Behaviour:
         targets = samples.targets(self.contradictions)
-        pairs = _Pairs(space.vsa, samples.conditions, targets, space.items(samples.results), self.margin)
+        margins = self.margin + self.evidence * samples.evidence()
+        pairs = Pairs(space.vsa, samples, targets, space.items(samples.results), margins)
         start = torch.zeros(space.vsa.dim, dtype=space.vsa.accumulator, device=targets.device)
         if before is not None:
             start = start + as_bipolar(before.program).detach()
@@ -113,7 +128,7 @@ class ErrorDriven(Rule):
             before, Behaviour(space, trained.program, samples.condition_sum(space.vsa), samples.results, report)
         )
 
-    def _train(self, pairs: "_Pairs", program: Shaped[Tensor, "d"], progress: Progress) -> "_Trained":
+    def _train(self, pairs: Pairs, program: Shaped[Tensor, "d"], progress: Progress) -> "_Trained":
         """Train sequentially: pairs are visited in order, each with all earlier corrections applied.
 
         With corrections c_i made after v_i of V visits, the mean program over all visits is
@@ -128,21 +143,20 @@ class ErrorDriven(Rule):
         readout = pairs.readout.of(program)
         while len(corrections) < self.epochs:
             corrected = start = 0
-            size = _BLOCK
+            size = BLOCK
             while start < len(pairs):
                 # Pairs before the first incorrect one do not change the program, so a block of them is scored at
                 # once. After a correction the next block starts behind the corrected pair.
-                short, rivals, rival_scores = pairs.judge(readout, start, size)
+                short, add, subtract = pairs.judge(readout, start, size)
                 if visits + start - reported >= _PAIRS_PER_REPORT:
                     reported = visits + start
                     progress(reported / (self.epochs * len(pairs)))
                 if not short.any():
-                    start += size
-                    size = min(2 * size, _BLOCK)
+                    start += len(short)
+                    size = min(2 * size, BLOCK)
                     continue
                 offset = int(short.to(torch.int8).argmax())
-                rival = int(rivals[offset]) if rival_scores[offset] > 0 else None
-                change = pairs.change(start + offset, rival)
+                change = pairs.change(start + offset, int(add[offset]), int(subtract[offset]))
                 program = program + change
                 readout = pairs.readout.of(program)
                 if self.average:
@@ -152,7 +166,7 @@ class ErrorDriven(Rule):
                 if exact:
                     # Small blocks where corrections are dense, so that few scores are discarded. The last bits of
                     # float scores may depend on the size of the block, so that it stays the same for floats.
-                    size = min(2 * offset + 1, _BLOCK)
+                    size = min(2 * offset + 1, BLOCK)
             visits += len(pairs)
             corrections.append(corrected)
             ends.append(program)
@@ -186,59 +200,6 @@ class _Trained(NamedTuple):
     """Pairs recalled wrongly or below the margin."""
 
 
-class _Pairs:
-    """The pairs to train on, and how a program scores them."""
-
-    def __init__(
-        self,
-        vsa: VSA,
-        conditions: Shaped[Tensor, "k d"] | LazyConditions,
-        targets: Int64[Tensor, "k"],
-        items: Shaped[Tensor, "r d"],
-        margin: float,
-    ) -> None:
-        self.vsa, self.conditions, self.targets, self.items = vsa, conditions, targets, items
-        self.readout = vsa.readout(torch.zeros(vsa.dim, dtype=vsa.accumulator, device=items.device), items)
-        # The score that one stored pair gives itself is the unit of margins.
-        unit = torch.cat([norms(vsa.bind(items[t], c)) ** 2 for c, t in _blocks(conditions, targets)])
-        self.required_lead = margin * unit / norms(items)[targets]
-
-    def __len__(self) -> int:
-        return len(self.targets)
-
-    def judge(
-        self, readout: Readout, start: int, size: int
-    ) -> tuple[Bool[Tensor, "rows"], Int64[Tensor, "rows"], Float64[Tensor, "rows"]]:
-        """For the block of pairs from `start` on: whether each lacks its margin, its rival, and the rival's score."""
-        return self._judge(readout(self.conditions[start : start + size]), start)
-
-    def outcome(self, program: Shaped[Tensor, "d"]) -> tuple[int, int]:
-        """The number of pairs recalled wrongly, and of pairs recalled wrongly or below the margin."""
-        wrong, short, readout = 0, 0, self.readout.of(program)
-        for start in range(0, len(self), _BLOCK):
-            scores = readout(self.conditions[start : start + _BLOCK])
-            wrong += int((scores.argmax(-1) != self.targets[start : start + _BLOCK]).sum())
-            short += int(self._judge(scores, start)[0].sum())
-        return wrong, short
-
-    def change(self, pair: int, rival: int | None) -> Shaped[Tensor, "d"]:
-        """The correction for a pair: the pair, less its condition bound with the rival result, if there is one."""
-        condition = self.conditions[pair]
-        change = self.vsa.superpose(self.vsa.bind(self.items[int(self.targets[pair])], condition)[None])
-        if rival is not None:
-            change = change - self.vsa.superpose(self.vsa.bind(self.items[rival], condition)[None])
-        return change
-
-    def _judge(
-        self, scores: Float64[Tensor, "rows r"], start: int
-    ) -> tuple[Bool[Tensor, "rows"], Int64[Tensor, "rows"], Float64[Tensor, "rows"]]:
-        rows = slice(start, start + len(scores))
-        targets = self.targets[rows, None]
-        rival_scores, rivals = scores.scatter(1, targets, -torch.inf).max(-1)
-        lead = scores.gather(1, targets)[:, 0] - rival_scores.clamp(min=0)
-        return (lead < self.required_lead[rows]) | (lead <= 0), rivals, rival_scores
-
-
 def _stalled(corrections: Sequence[int], pairs: int, patience: int, epochs: int) -> bool:
     """Whether, at the present rate, about a third of the pairs would still be corrected in the last of `epochs`.
 
@@ -257,9 +218,6 @@ def _stalled(corrections: Sequence[int], pairs: int, patience: int, epochs: int)
     return current - fall * (epochs - len(corrections)) > 0.3 * pairs + pairs**0.5
 
 
-_BLOCK = 64
-"""The most pairs scored in one call; where scores are exact, any number gives the same program."""
-
 _PAIRS_PER_REPORT = 512
 """Pairs visited between two calls of `progress` within an epoch."""
 
@@ -267,16 +225,8 @@ _ENCODING_SHARE = 0.1
 """The completed share of the work after encoding, for `progress`."""
 
 
-_ROWS = 256
-"""Pairs bound in one call when margins are computed; bounds the memory."""
-
-
 def _widest(x: Tensor) -> torch.dtype:
     """The widest type of the same kind, for sums over all visits."""
     if is_integer(x):
         return torch.int64
     return torch.complex128 if x.is_complex() else torch.float64
-
-
-def _blocks(conditions: Tensor | LazyConditions, targets: Tensor) -> zip:
-    return zip(conditions.split(_ROWS), targets.split(_ROWS), strict=True)

@@ -6,6 +6,7 @@ from typing import Any, Literal
 import torch
 from jaxtyping import Float, Float64, Shaped
 from torch import Tensor
+from torch.nn import functional
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
@@ -27,6 +28,9 @@ class LeastSquares(Rule):
     `"first"`, the `"majority"` or the `"latest"` alone. `ridge` is the weight of the squared length of the program, in
     units of the squared length of one stored pair.
 
+    `evidence` makes what was shown often louder: the target scores of a condition that was shown n times are multiplied
+    by `1 + evidence · log(1 + n)`. On `silent` conditions all targets are 0.
+
     The closed form needs element-wise binding of real numbers; `fit` raises `ValueError` for other architectures. The
     program is a float vector.
 
@@ -35,13 +39,15 @@ class LeastSquares(Rule):
 
     name = "least_squares"
     integer_programs = False
+    supports_silence = True
 
     ridge: float = 1e-3
     contradictions: Contradictions | Literal["all"] = "all"
+    evidence: float = 0.0
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions, "all")
-        set_fields(self, ridge=check_ridge(self.ridge))
+        set_fields(self, ridge=check_ridge(self.ridge), evidence=as_float("evidence", self.evidence, 0))
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
@@ -54,15 +60,26 @@ class LeastSquares(Rule):
         Raises `ValueError` for an architecture that is not supported, and for a `ridge` with which the system has no
         solution in floats.
         """
-        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2))
+        return self._learn(space, Samples.of(space, demonstrations, subrange(progress, 0, 0.2)), progress)
+
+    def fit_beside(
+        self, space: Space, demonstrations: Demonstrations, silent: Demonstrations, progress: Progress = no_progress
+    ) -> Behaviour:
+        """Learn a behaviour that is silent where others have an opinion, see `Rule.fit_beside`."""
+        return self._learn(space, Samples.of(space, demonstrations, subrange(progress, 0, 0.2), silent), progress)
+
+    def _learn(self, space: Space, shown: Samples, progress: Progress) -> Behaviour:
         samples = shown if self.contradictions == "all" else shown.resolved(self.contradictions)
         shape = len(samples.conditions), len(samples.results)
         cells = samples.condition * shape[1] + samples.result
         counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
         items = space.items(samples.results)
-        targets = counts / counts.sum(1, keepdim=True)
-        conditions = samples.conditions[:]
-        program = solve(space.vsa, conditions, items, targets, self.ridge, subrange(progress, 0.2, 0.9))
+        targets = counts / counts.sum(1, keepdim=True) * (1 + self.evidence * samples.evidence()[:, None])
+        conditions = fitted = samples.conditions[:]
+        if samples.silent is not None:
+            fitted = torch.cat([conditions, samples.silent[:]])
+            targets = functional.pad(targets, (0, 0, 0, len(samples.silent)))
+        program = solve(space.vsa, fitted, items, targets, self.ridge, subrange(progress, 0.2, 0.9))
         predicted = space.vsa.readout(program, items)(conditions).argmax(1)
         report = samples.report(
             self.name,

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import torch
-from jaxtyping import Bool, Int64, Shaped
+from jaxtyping import Bool, Float64, Int64, Shaped
 from torch import Tensor
 
 from behaviours.demonstrations import Demonstrations
@@ -39,12 +39,21 @@ class Samples:
     """The index of each sample's condition."""
     result: Int64[Tensor, "N"]
     """The index of each sample's result."""
+    silent: Shaped[Tensor, "q d"] | LazyConditions | None = None
+    """Further conditions, on which a behaviour is to be silent."""
 
     @classmethod
-    def of(cls, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> "Samples":
+    def of(
+        cls,
+        space: Space,
+        demonstrations: Demonstrations,
+        progress: Progress = no_progress,
+        silent: Demonstrations | None = None,
+    ) -> "Samples":
         """Check, quantise and encode demonstrations. Conditions are equal if their hypervectors are.
 
-        Raises `ValueError` for invalid readings or commands, and for a row in which no sensor was observed.
+        Of `silent` only the readings are used, in conditions that the demonstrations do not show. Raises `ValueError`
+        for invalid readings or commands, and for a row in which no sensor was observed.
         """
         demonstrations.check_names(space.schema)
         cells = space.cells(demonstrations.sensors, demonstrations.episodes)
@@ -54,7 +63,8 @@ class Samples:
         levels = space.schema.command_levels(demonstrations.commands).to(cells.device)
         conditions, condition = encode_distinct(space, cells, progress)
         distinct_results, result = distinct_rows(levels)
-        return cls(conditions, distinct_results, condition, result)
+        others = None if silent is None else _others(space, cells, silent)
+        return cls(conditions, distinct_results, condition, result, others)
 
     def with_known_results(self, results: Int64[Tensor, "p m"]) -> "Samples":
         """The same samples, with indices into `results` (stored before) followed by the new results."""
@@ -74,6 +84,10 @@ class Samples:
         pick = "amin" if contradictions == "first" else "amax"
         chosen = torch.zeros(conditions, dtype=torch.int64, device=rows.device)
         return self.result[chosen.scatter_reduce(0, self.condition, rows, pick, include_self=False)]
+
+    def evidence(self) -> Float64[Tensor, "k"]:
+        """log(1 + n) for each condition, which was shown n times."""
+        return torch.bincount(self.condition).to(torch.float64).log1p()
 
     def resolved(self, contradictions: Contradictions) -> "Samples":
         """The same samples, each with the result to learn for its condition, see `targets`."""
@@ -96,6 +110,18 @@ class Samples:
         for block in self.conditions.split(_ROWS):
             total = total + vsa.superpose(block)
         return total
+
+
+def _others(
+    space: Space, cells: Shaped[Tensor, "N w"], silent: Demonstrations
+) -> Shaped[Tensor, "q d"] | LazyConditions | None:
+    """The distinct conditions of `silent` that are not among those of `cells`; None for no such condition."""
+    silent.check_names(space.schema)
+    more = space.cells(silent.sensors, silent.episodes)
+    distinct, index = distinct_rows(torch.cat([cells, more[(more >= 0).any(-1)]]))
+    new = torch.ones(len(distinct), dtype=torch.bool, device=cells.device)
+    new[index[: len(cells)]] = False
+    return encode_distinct(space, distinct[new])[0] if new.any() else None
 
 
 _ROWS = 256

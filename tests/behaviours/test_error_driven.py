@@ -102,7 +102,7 @@ def test_it_is_the_sequential_perceptron_whatever_the_block(count: int, monkeypa
     # .49 keeps the comparison off the exact ties that round differently in other orders of operations.
     expected = perceptron(made, shown, 0.49, 4)
     for block in (1, 3, 64):
-        monkeypatch.setattr(module, "_BLOCK", block)
+        monkeypatch.setattr(module, "BLOCK", block)
         behaviour = ErrorDriven(0.49, epochs=4).fit(made, shown)
         np.testing.assert_array_equal(behaviour.program.numpy(), expected)
 
@@ -111,7 +111,7 @@ def test_the_report_does_not_depend_on_the_block(monkeypatch: pytest.MonkeyPatch
     shown, made = random_pairs(70), space(256)
     fits = []
     for block in (1, 3, 64):
-        monkeypatch.setattr(module, "_BLOCK", block)
+        monkeypatch.setattr(module, "BLOCK", block)
         fits.append(ErrorDriven().fit(made, shown))
     assert all(fit.report == fits[0].report and same_bits(fit.program, fits[0].program) for fit in fits)
 
@@ -172,7 +172,7 @@ def test_the_average_is_that_of_all_visits(count: int, epochs: int, monkeypatch:
     shown, made = random_pairs(count), space(256)
     expected = averaged(made, shown, 0.49, epochs)
     for block in (1, 64):
-        monkeypatch.setattr(module, "_BLOCK", block)
+        monkeypatch.setattr(module, "BLOCK", block)
         behaviour = ErrorDriven(0.49, epochs, average=True).fit(made, shown)
         assert behaviour.program.dtype == torch.float32
         np.testing.assert_array_equal(behaviour.program.numpy(), expected)
