@@ -1,6 +1,6 @@
 """A collection of named behaviours over one space."""
 
-from collections.abc import Iterator, Mapping, Sized
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from functools import partial
 from pathlib import Path
 from typing import Any, cast
@@ -14,6 +14,7 @@ from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import ErrorDriven, Gradient, Rule, require_rule
 from behaviours.memory import check_levels
+from behaviours.options import as_float
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
@@ -42,6 +43,7 @@ class BehaviourBank(nn.Module):
         rule: Rule | None = None,
         progress: Progress = no_progress,
         silent: Demonstrations | None = None,
+        sensors: Sequence[str] | None = None,
     ) -> LearningReport:
         """Learn a behaviour and keep it under `name`, where it replaces an existing one.
 
@@ -51,6 +53,7 @@ class BehaviourBank(nn.Module):
             rule: The learning rule; by default `Gradient()`.
             progress: Called with the completed fraction of the work, from 0 to 1.
             silent: Readings on which the behaviour is to have no opinion, see `Rule.fit_beside`.
+            sensors: The names of the sensors that the behaviour uses, by default all; see `Space.using`.
 
         Returns:
             What the rule did with the samples.
@@ -61,10 +64,12 @@ class BehaviourBank(nn.Module):
         check_name(name)
         rule = Gradient() if rule is None else rule
         require_rule(rule)
+        space = self.space if sensors is None else self.space.using(sensors)
         if silent is None:
-            behaviour = rule.fit(self.space, demonstrations, progress)
+            behaviour = rule.fit(space, demonstrations, progress)
         else:
-            behaviour = rule.fit_beside(self.space, demonstrations, silent, progress)
+            behaviour = rule.fit_beside(space, demonstrations, silent, progress)
+        behaviour.calibrate(demonstrations)
         self.add(name, behaviour)
         return self[name].report
 
@@ -73,6 +78,7 @@ class BehaviourBank(nn.Module):
         shown: Mapping[str, Demonstrations],
         rule: Rule | Mapping[str, Rule] | None = None,
         silence: bool = True,
+        sensors: Mapping[str, Sequence[str]] | None = None,
         progress: Progress = no_progress,
     ) -> None:
         """Learn several behaviours so that their plain sum answers as if it had been learned from all of them at once.
@@ -89,6 +95,7 @@ class BehaviourBank(nn.Module):
             shown: The demonstrations of each behaviour, by name.
             rule: One rule, or one for each name; by default `ErrorDriven(margin=5, evidence=1)`.
             silence: Whether each behaviour is silent on conditions that only others know.
+            sensors: The sensors that a behaviour uses, by its name; all for those that are not named.
             progress: Called with the completed fraction of the work, from 0 to 1.
         """
         rules = rule if isinstance(rule, Mapping) else dict.fromkeys(shown, rule or ErrorDriven(margin=5, evidence=1))
@@ -98,7 +105,7 @@ class BehaviourBank(nn.Module):
             others = [part for other, part in shown.items() if other != name]
             silent = Demonstrations.join(others) if silence and others else None
             part = subrange(progress, number / len(shown), (number + 1) / len(shown))
-            self.learn(name, own, rules[name], part, silent)
+            self.learn(name, own, rules[name], part, silent, None if sensors is None else sensors.get(name))
 
     def partial_fit(
         self, name: str, demonstrations: Demonstrations, rule: Rule, progress: Progress = no_progress
@@ -120,7 +127,11 @@ class BehaviourBank(nn.Module):
         require_rule(rule)
         if name not in self:
             return self.learn(name, demonstrations, rule, progress)
-        behaviour = rule.partial_fit(self[name], demonstrations, progress)
+        before = self[name]
+        behaviour = rule.partial_fit(before, demonstrations, progress)
+        behaviour.calibrate(demonstrations)
+        if before.threshold is not None and behaviour.threshold is not None:
+            behaviour.threshold = min(before.threshold, behaviour.threshold)
         self.add(name, behaviour)
         return behaviour.report
 
@@ -136,7 +147,7 @@ class BehaviourBank(nn.Module):
                 f"behaviour {name!r} was learned over another space (other sensors, codes or seed), so "
                 "that it cannot join this bank"
             )
-        if behaviour.space is not self.space:
+        if behaviour.space is not self.space and behaviour.space.encoder is not self.space.encoder:
             behaviour = behaviour.over(self.space)
         behaviour.name = name
         if name in self._names:
@@ -228,6 +239,8 @@ class BehaviourBank(nn.Module):
             with error_context("behaviours"):
                 entries = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
                 terms = [entry.get("terms") for entry in about["behaviours"]]
+                used = [entry.get("sensors") for entry in about["behaviours"]]
+                thresholds = [_threshold(entry.get("threshold")) for entry in about["behaviours"]]
                 for name, _ in entries:
                     check_name(name)
                 if len({name for name, _ in entries}) < len(entries):
@@ -244,13 +257,15 @@ class BehaviourBank(nn.Module):
                 space = Space.from_config(
                     about["space"], {name.removeprefix("space."): tensors[name] for name in codebooks}
                 )
+                spaces = [space if sensors is None else space.using(sensors) for sensors in used]
             bank = cls(space)
             for number, (name, report) in enumerate(entries):
                 with error_context(f"behaviour {name!r}"):
                     program, known, results = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
                     check_levels(space.schema, results)
                     parsed = () if terms[number] is None else terms_from_dicts(terms[number], results)
-                    behaviour = Behaviour(space, program, known, results, report, parsed)
+                    behaviour = Behaviour(spaces[number], program, known, results, report, parsed)
+                    behaviour.threshold = thresholds[number]
                 bank.add(name, behaviour)
         return bank
 
@@ -264,8 +279,16 @@ def _codebooks(config: dict[str, Any]) -> Layout:
 
 def _entry(name: str, behaviour: Behaviour) -> dict[str, Any]:
     entry = {"name": name, "report": behaviour.report.to_dict()}
+    if behaviour.threshold is not None:
+        entry |= {"threshold": behaviour.threshold}
+    if len(behaviour.space.sensors) < len(behaviour.space.schema.sensors):
+        entry |= {"sensors": list(behaviour.space.sensors)}
     # A behaviour that is no sum has no terms to write.
     return entry | ({"terms": terms_to_dicts(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
+
+
+def _threshold(value: Any) -> float | None:
+    return None if value is None else as_float("threshold", value, -1)
 
 
 def check_name(name: object) -> None:

@@ -11,8 +11,10 @@ from torch import Tensor, nn
 
 from behaviours.algebra import Term, checked_weight, merge_terms, merged_report, merged_results, weighted_sum
 from behaviours.controller import Controller
+from behaviours.demonstrations import Demonstrations
 from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
+from behaviours.ordered import distinct_rows
 from behaviours.recall import Recall, answer_cells, answer_conditions
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Sensor
@@ -60,6 +62,8 @@ class Behaviour(Controller):
         self.report = report
         self.name = ""
         """The name of the behaviour in its bank."""
+        self.threshold: float | None = None
+        """The familiarity that nearly all of the demonstrated conditions reach, see `calibrate`; None if unknown."""
         self._terms = tuple(terms)
         if isinstance(program, nn.Parameter):
             self.register_parameter("program", program)
@@ -76,11 +80,14 @@ class Behaviour(Controller):
 
     def over(self, space: Space) -> "Behaviour":
         """The same behaviour over another space with equal codebooks, on the device of that space."""
-        device = space.device
+        device, sensors = space.device, self.space.sensors
+        space = space if sensors == space.sensors else space.using(sensors)
         program = self.program.detach().to(device)
         if isinstance(self.program, nn.Parameter):
             program = nn.Parameter(program)
-        return Behaviour(space, program, self.known.to(device), self.results.to(device), self.report, self._terms)
+        moved = Behaviour(space, program, self.known.to(device), self.results.to(device), self.report, self._terms)
+        moved.threshold = self.threshold
+        return moved
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -110,6 +117,11 @@ class Behaviour(Controller):
         space = weighted[0][0].space
         if not all(space.same_as(part.space) for part, _ in weighted):
             raise ValueError("behaviours over different spaces (other sensors, codes or seeds) do not add up")
+        if len({part.space.sensors for part, _ in weighted}) > 1:
+            raise ValueError(
+                "behaviours that use different sensors do not add up, since no condition is one of both; combine them "
+                "by a policy that asks each of them, such as MotorSchema or Priority"
+            )
         terms = merge_terms([replace(t, weight=weight * t.weight) for part, weight in weighted for t in part.terms])
         if not terms:
             raise ValueError("the behaviours of this sum cancel each other, so that no term is left")
@@ -179,6 +191,12 @@ class Behaviour(Controller):
             )
         return same.to(torch.int8).argmax(-1)
 
+    def calibrate(self, demonstrations: Demonstrations, quantile: float = 0.02) -> None:
+        """Set `threshold` to this quantile of the familiarity of the demonstrated conditions, each counted once."""
+        cells = distinct_rows(self.space.cells(demonstrations.sensors, demonstrations.episodes))[0]
+        familiar = self.answer(cells).familiarity.to(torch.float64)
+        self.threshold = float(familiar.quantile(quantile))
+
     def trainable(self) -> "Behaviour":
         """A copy over the same space whose program is a float `nn.Parameter`, for a PyTorch training loop.
 
@@ -212,10 +230,11 @@ class Behaviour(Controller):
 
     def __repr__(self) -> str:
         schema, report = self.space.schema, self.report
+        used = [sensor for sensor in schema.sensors if sensor.name in self.space.sensors]
         name = f"{self.name!r}, " if self.name else ""
         origin = f"sum of {', '.join(report.terms)}" if report.terms else f"{report.rule}, {report.pairs} pairs"
         return (
-            f"Behaviour({name}d={self.space.vsa.dim}, {name_list('sensors', schema.sensors)}, "
+            f"Behaviour({name}d={self.space.vsa.dim}, {name_list('sensors', used)}, "
             f"{name_list('actuators', schema.actuators)}, {origin}, {len(self.results)} results)"
         )
 

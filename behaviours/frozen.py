@@ -86,13 +86,15 @@ class _Tick:
     """Recall of a single row, in NumPy."""
 
     def __init__(self, frozen: FrozenBehaviour, encode: Row, noise: Noise) -> None:
-        schema, readout = frozen.space.schema, frozen.readout
+        space, readout = frozen.space, frozen.readout
+        schema = space.schema
         assert readout.folded is not None
         self.encode, self.noise = encode, noise
         self.low, self.high = (
             np.array([getattr(sensor, end) for sensor in schema.sensors], dtype=np.float64) for end in ("low", "high")
         )
         self.width = self.high - self.low
+        self.unused = [name not in space.sensors for name in (sensor.name for sensor in schema.sensors)]
         self.ends = self.low.tolist(), self.high.tolist()
         known, _ = in_units(frozen.known)
         rows = [real_parts(as_bipolar(rows)).to(torch.float64) for rows in (readout.folded, known[None])]
@@ -114,6 +116,8 @@ class _Tick:
 
     def __call__(self, readings: Any) -> Recall | None:
         row = _one_row(readings, len(self.low))
+        if row is not None and any(self.unused):
+            row = np.where(self.unused, np.nan, row)
         # A row with no reading, or with an invalid one, takes the general path.
         if row is None or not self._valid(row.tolist()):
             return None

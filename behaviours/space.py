@@ -1,7 +1,7 @@
 """The codebooks that encode readings and commands."""
 
 import copy
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 import torch
@@ -15,6 +15,7 @@ from behaviours.schema import Schema
 from behaviours.storage import Layout, check_layout, error_context
 from torchvsa import MAP, VSA, Part, Protection, Unprotected
 from torchvsa.encoders import Balanced, Encoder, Sum, ValueEncoder
+from torchvsa.encoders.base import UNOBSERVED
 
 
 class Space(nn.Module):
@@ -37,6 +38,8 @@ class Space(nn.Module):
         ValueError: For parts of different architectures or numbers of sensors, and for an encoder that has the same
             code for two values of a categorical or binary sensor.
     """
+
+    _unused: Tensor
 
     def __init__(
         self,
@@ -69,6 +72,28 @@ class Space(nn.Module):
         check_distinguishable(schema, self.encoder)
         self.result_encoder = _drawn(result_encoder, self.vsa, generator)
         self.protect = _drawn(protection, self.vsa, generator)
+        self.sensors = tuple(sensor.name for sensor in schema.sensors)
+        """The names of the sensors that are used, see `using`."""
+        self.register_buffer("_unused", torch.zeros(sensors, dtype=torch.bool), persistent=False)
+
+    def using(self, sensors: Sequence[str]) -> Self:
+        """The same codebooks for a behaviour that uses only these sensors: readings of all others count as unobserved.
+
+        Raises `ValueError` for names that the schema does not have, and for none.
+        """
+        known = [sensor.name for sensor in self.schema.sensors]
+        if isinstance(sensors, str) or not sensors or not set(sensors) <= set(known):
+            raise ValueError(f"sensors is a list of names out of {', '.join(known)}; got {sensors!r}")
+        view = copy.copy(self)
+        view._buffers = {"_unused": torch.tensor([name not in sensors for name in known], device=self.device)}
+        view.sensors = tuple(name for name in known if name in sensors)
+        return view
+
+    def seen(self, cells: Shaped[Tensor, "batch w"]) -> Shaped[Tensor, "batch w"]:
+        """The cells with those of unused sensors as not observed."""
+        if len(self.sensors) == len(self.schema.sensors):
+            return cells
+        return cells.masked_fill(self._unused.repeat(cells.shape[1] // len(self._unused)), UNOBSERVED)
 
     def cells(self, readings: Any, episodes: Int64[Tensor, "N"] | None = None) -> Shaped[Tensor, "batch w"]:
         """The cells that the encoder derives from readings `[B, n]`, see `Encoder.cells`.
@@ -84,7 +109,7 @@ class Space(nn.Module):
                     "live ones"
                 )
             x = self.encoder.windows(x, episodes.to(self.device))
-        return self.encoder.cells(x)
+        return self.seen(self.encoder.cells(x))
 
     def encode(self, cells: Shaped[Tensor, "batch w"]) -> Shaped[Tensor, "batch d"]:
         """The protected condition of each row of cells (Algorithm 1, line 3, and the protection of line 6)."""
@@ -99,7 +124,7 @@ class Space(nn.Module):
     ) -> tuple[Shaped[Tensor, "batch w"], Float64[Tensor, "batch past n"]]:
         """The cells of live readings `[B, n]`, given the readings `past`, and the past of the next step."""
         x, past = self.encoder.step(self.schema.normalise(readings).to(self.device), past)
-        return self.encoder.cells(x), past
+        return self.seen(self.encoder.cells(x)), past
 
     def items(self, levels: Int64[Tensor, "k m"]) -> Shaped[Tensor, "k d"]:
         """The hypervector of each result, a row of one level per actuator."""
@@ -122,7 +147,7 @@ class Space(nn.Module):
         }
 
     def same_as(self, other: "Space") -> bool:
-        """Whether configurations and codebooks are equal; they may be on different devices."""
+        """Whether configurations and codebooks are equal; devices, and the sensors that are used, may differ."""
         if self is other:
             return True
         mine, theirs = self.state_dict(), other.state_dict()

@@ -21,8 +21,10 @@ from behaviours._atomic import write_atomically
 
 __all__ = ["FORMAT", "Layout", "check_layout", "error_context", "load_tensors", "save_tensors", "write_atomically"]
 
-FORMAT = 2
-"""The version of the format that is written."""
+FORMAT = 3
+"""The version of the format that is written; format 2 (torchvsa 0.2.0) has no behaviours of some sensors only."""
+READ = (2, FORMAT)
+"""The versions that are read."""
 
 Layout = Mapping[str, tuple[torch.dtype, tuple[int, ...]]]
 """The type and shape of each tensor, by name."""
@@ -73,8 +75,8 @@ def _check_head(head: Any, kind: str) -> None:
     if head.get("kind") != kind:
         raise ValueError(f"the file holds {head.get('kind')!r}, not {kind!r}")
     version = head.get("format")
-    if version != FORMAT or isinstance(version, bool):
-        raise ValueError(f"the file has format {version!r}; this version reads format {FORMAT}")
+    if version not in READ or isinstance(version, bool):
+        raise ValueError(f"the file has format {version!r}; this version reads formats {', '.join(map(str, READ))}")
 
 
 def checksum(head: Mapping[str, Any], tensors: Mapping[str, Tensor]) -> str:
