@@ -4,7 +4,18 @@ from typing import TYPE_CHECKING, Any
 
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
-from behaviours.composition import POLICIES, Bundle, Policy, Priority
+from behaviours.composition import (
+    POLICIES,
+    Blending,
+    Bundle,
+    Gated,
+    MotorSchema,
+    Policy,
+    Priority,
+    Silence,
+    Vote,
+    WinnerTakesAll,
+)
 from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
 from behaviours.edges import quantile_edges
@@ -25,15 +36,18 @@ __all__ = [
     "Actuator",
     "Behaviour",
     "BehaviourBank",
+    "Blending",
     "Bundle",
     "Controller",
     "ConvergenceWarning",
     "Demonstrations",
     "ErrorDriven",
     "FrozenBehaviour",
+    "Gated",
     "Gradient",
     "LearningReport",
     "LeastSquares",
+    "MotorSchema",
     "OneShot",
     "Policy",
     "Priority",
@@ -41,7 +55,10 @@ __all__ = [
     "Rule",
     "Schema",
     "Sensor",
+    "Silence",
     "Space",
+    "Vote",
+    "WinnerTakesAll",
     "quantile_edges",
 ]
 

@@ -174,15 +174,18 @@ class BehaviourBank(nn.Module):
         if not len(self):
             return {}
         recall = over_unique_rows(partial(by_blocks, self._query_all, row_bytes=8 * self.space.vsa.dim), cells)
-        unobserved = (cells < 0).all(-1)
         commands, similarity, margin, familiarity, _ = recall
         # The second dimension is that of the behaviours.
         columns = zip(*(field.unbind(1) for field in (commands, similarity, margin, familiarity)), strict=True)
-        return {name: Recall(*column).mask_unobserved(unobserved) for name, column in zip(self, columns, strict=True)}
+        return {
+            name: Recall(*column).mask_unobserved((self[name].space.seen(cells) < 0).all(-1))
+            for name, column in zip(self, columns, strict=True)
+        }
 
     def _query_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        conditions = self.space.encode(cells)
-        answers = [self[name].query(conditions) for name in self]
+        behaviours = [self[name] for name in self]
+        conditions = conditions_of(behaviours, self.space, cells)
+        answers = [part.query(condition) for part, condition in zip(behaviours, conditions, strict=True)]
         return Recall(*(torch.stack([getattr(answer, f) for answer in answers], 1) for f in Recall._fields[:4]))
 
     @property
@@ -268,6 +271,23 @@ class BehaviourBank(nn.Module):
                     behaviour.threshold = thresholds[number]
                 bank.add(name, behaviour)
         return bank
+
+
+def conditions_of(
+    behaviours: Sequence[Behaviour], space: Space, cells: Shaped[Tensor, "batch w"]
+) -> list[Shaped[Tensor, "batch d"]]:
+    """The encoded and protected condition for each behaviour, made of the sensors that it uses.
+
+    Behaviours that use the same sensors share one tensor. One none of whose sensors was observed has a condition of
+    zeros, which is similar to nothing.
+    """
+    encoded: dict[tuple[str, ...], Tensor] = {}
+    for sensors, seen in {part.space.sensors: part.space.seen(cells) for part in behaviours}.items():
+        condition = space.encode(seen)
+        # Rows in which no sensor at all was observed are masked in the answer.
+        everything = len(sensors) == len(space.schema.sensors)
+        encoded[sensors] = condition if everything else condition.masked_fill((seen < 0).all(-1, keepdim=True), 0)
+    return [encoded[part.space.sensors] for part in behaviours]
 
 
 _PARTS = ("program", "known", "results")

@@ -195,7 +195,7 @@ class Behaviour(Controller):
         """Set `threshold` to this quantile of the familiarity of the demonstrated conditions, each counted once."""
         cells = distinct_rows(self.space.cells(demonstrations.sensors, demonstrations.episodes))[0]
         familiar = self.answer(cells).familiarity.to(torch.float64)
-        self.threshold = float(familiar.quantile(quantile))
+        self.threshold = float(familiar.quantile(quantile, interpolation="lower"))
 
     def trainable(self) -> "Behaviour":
         """A copy over the same space whose program is a float `nn.Parameter`, for a PyTorch training loop.

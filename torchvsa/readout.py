@@ -76,6 +76,11 @@ class Readout(nn.Module):
         scores = over_lengths(self._products(conditions).to(torch.float64), self.lengths)
         return scores if self.units is None else scores * self.units.to(torch.float64)
 
+    def cosines(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
+        """The cosine of each unbound, noisy result with each item; 0 for zero vectors."""
+        scores = over_lengths(self._products(conditions).to(torch.float64), self.lengths)
+        return over_lengths(scores, self._noise(conditions)[..., None])
+
     def match(self, conditions: Shaped[Tensor, "batch d"]) -> Match:
         """The best item for each condition, `[B]` or `[B, b]`, with its cosine and margin (see `CleanUp`)."""
         if self.vsa.bilinear and is_integer(conditions):

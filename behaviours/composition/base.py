@@ -4,10 +4,11 @@ from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import cast
 
-from jaxtyping import Shaped
+import torch
+from jaxtyping import Float64, Int64, Shaped
 from torch import Tensor, nn
 
-from behaviours.bank import BehaviourBank
+from behaviours.bank import BehaviourBank, conditions_of
 from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
 from behaviours.options import as_float
@@ -41,11 +42,44 @@ class Policy(Controller):
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         # In blocks, so that not all conditions are in memory at once.
-        return by_blocks(lambda rows: self.query(self.space.encode(rows)), cells, row_bytes=self.space.vsa.row_bytes)
+        return by_blocks(lambda rows: self.query(self.conditions(rows)), cells, row_bytes=self.space.vsa.row_bytes)
+
+    def conditions(self, cells: Shaped[Tensor, "batch w"]) -> list[Shaped[Tensor, "batch d"]]:
+        """The encoded and protected condition for each behaviour, made of the sensors that it uses.
+
+        Those that use the same sensors share one tensor. A behaviour none of whose sensors was observed has a condition
+        of zeros, which is similar to nothing.
+        """
+        return conditions_of(self.parts, self.space, cells)
 
     @abstractmethod
-    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """The answer to encoded and protected conditions."""
+    def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
+        """The answer to conditions, one tensor for each behaviour, see `conditions`."""
+
+    def answers(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> list[Recall]:
+        """What each behaviour answers."""
+        return [part.query(condition) for part, condition in zip(self.parts, conditions, strict=True)]
+
+    def known(self, answers: Sequence[Recall]) -> Float64[Tensor, "batch b"]:
+        """How well each behaviour knows its condition: familiarity times √k, for k pairs in its program.
+
+        A condition that is one of k unrelated ones has a familiarity of about 1/√k.
+        """
+        columns = zip(self.parts, answers, strict=True)
+        return torch.stack(
+            [max(part.report.pairs, 1) ** 0.5 * recall.familiarity.double() for part, recall in columns], -1
+        )
+
+    def spoken(self, answers: Sequence[Recall], speaker: Int64[Tensor, "batch"]) -> Recall:
+        """The answer of one behaviour for each row: that of `speaker`."""
+        rows = torch.arange(len(speaker), device=speaker.device)
+
+        def of_speaker(field: str) -> Tensor:
+            return torch.stack([getattr(recall, field) for recall in answers])[speaker, rows]
+
+        return Recall(
+            of_speaker("commands"), of_speaker("similarity"), of_speaker("margin"), of_speaker("familiarity"), speaker
+        )
 
     def per_behaviour(self, given: Mapping[str, float] | None, otherwise: Sequence[float], what: str) -> list[float]:
         """One number per behaviour.

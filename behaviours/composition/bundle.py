@@ -1,6 +1,6 @@
 """Combine behaviours by the weighted sum of their programs."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import torch
 from jaxtyping import Shaped
@@ -28,7 +28,7 @@ class Bundle(Policy):
             known conditions and results, but stays in `names`.
 
     Raises:
-        ValueError: For weights that are not finite or are all 0, and for sums with elements that could exceed 2^53, up
+        ValueError: For behaviours that use different sensors, for weights that are not finite or are all 0, and for sums with elements that could exceed 2^53, up
             to which float64 represents all integers, or that are so small that their squares underflow.
     """
 
@@ -51,14 +51,14 @@ class Bundle(Policy):
         """The weighted sum of the programs."""
         return self.behaviour.program
 
-    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """The answer to encoded and protected conditions, see `Policy.query`."""
-        whole = self.behaviour
+    def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
+        """See `Policy.query`."""
+        whole, condition = self.behaviour, conditions[0]
         readout = whole.readout()
-        match = readout.match(conditions)
+        match = readout.match(condition)
         # The score of a result is the weighted sum of its scores for each behaviour.
-        parts = readout.of(stack_programs([part.program for part in self.parts]))(conditions)
+        parts = readout.of(stack_programs([part.program for part in self.parts]))(condition)
         winner = match.index[:, None, None].expand(-1, len(self.weights), 1)
         shares = (self._weights * parts.gather(-1, winner)[..., 0]).masked_fill(self._weights == 0, -torch.inf)
-        familiar = familiarity(conditions, whole.known)
+        familiar = familiarity(condition, whole.known)
         return Recall(whole.memory.commands[match.index], match.similarity, match.margin, familiar, shares.argmax(-1))

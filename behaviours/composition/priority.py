@@ -7,6 +7,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from behaviours.bank import BehaviourBank
+from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
 from behaviours.recall import Recall
 
@@ -14,8 +15,9 @@ from behaviours.recall import Recall
 class Priority(Policy):
     """Subsumption: the first behaviour in `order` whose familiarity is above its threshold answers.
 
-    If there is none, the behaviour with the highest familiarity answers. The similarity of a known condition to the sum
-    of k unrelated conditions is about 1/√k, so thresholds default to half of that.
+    If there is none, the one that comes nearest to its threshold does. By default a threshold is what nearly all of the
+    behaviour's own conditions reach (`Behaviour.threshold`); where that is unknown, as for sums, it is half of 1/√k, the
+    familiarity of one of k unrelated conditions.
 
     Args:
         bank: The behaviours to combine.
@@ -36,23 +38,24 @@ class Priority(Policy):
         if isinstance(order, str):
             raise TypeError(f"order is a list of names, the highest priority first; write [{order!r}] for {order!r}")
         super().__init__(bank, bank.names if order is None else list(order))
-        defaults = [0.5 / max(part.report.pairs, 1) ** 0.5 for part in self.parts]
+        defaults = [_threshold(part) for part in self.parts]
         self.thresholds = self.per_behaviour(thresholds, defaults, "thresholds")
         # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.
         column = torch.tensor(self.thresholds, device=self.space.device)[:, None]
         self.register_buffer("_thresholds", column, persistent=False)
 
-    def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
-        """The answer to encoded and protected conditions, see `Policy.query`."""
-        answers = [part.query(conditions) for part in self.parts]
-        familiarity = torch.stack([recall.familiarity for recall in answers])
-        known = familiarity > self._thresholds
-        speaker = torch.where(known.any(0), known.to(torch.int8).argmax(0), familiarity.argmax(0))
-        rows = torch.arange(conditions.shape[0], device=speaker.device)
+    def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
+        """See `Policy.query`."""
+        answers = self.answers(conditions)
+        above = torch.stack([recall.familiarity for recall in answers]) - self._thresholds
+        known = above >= 0
+        speaker = torch.where(known.any(0), known.to(torch.int8).argmax(0), above.argmax(0))
+        return self.spoken(answers, speaker)
 
-        def of_speaker(field: str) -> Tensor:
-            return torch.stack([getattr(recall, field) for recall in answers])[speaker, rows]
 
-        return Recall(
-            of_speaker("commands"), of_speaker("similarity"), of_speaker("margin"), of_speaker("familiarity"), speaker
-        )
+def _threshold(part: Behaviour) -> float:
+    # Rounding must not make the least familiar condition unknown.
+    return 0.5 / max(part.report.pairs, 1) ** 0.5 if part.threshold is None else part.threshold - _ROUNDING
+
+
+_ROUNDING = 1e-6

@@ -6,7 +6,7 @@ import pytest
 import torch
 from robots import SCHEMA, random_pairs, same_bits, space
 
-from behaviours import POLICIES, BehaviourBank, Bundle, OneShot, Policy, Priority, Recall, Space
+from behaviours import POLICIES, BehaviourBank, Blending, Bundle, OneShot, Policy, Priority, Recall, Space
 from behaviours.testing import check_policy
 from torchvsa import ARCHITECTURES, MAP
 from torchvsa.encoders import History, RandomFourier
@@ -64,7 +64,8 @@ def test_they_keep_the_laws_over_a_memory_of_continuous_readings(make: Make) -> 
 def test_each_condition_is_answered_by_who_learned_it(make: Make, vsa: str) -> None:
     shown = random_pairs(12)
     recall = make(bank(vsa))(shown.sensors)
-    assert recall.commands.tolist() == shown.commands.tolist()
+    # Blending leaves a small weight to the others.
+    torch.testing.assert_close(recall.commands, shown.commands, rtol=0, atol=0 if make is not Blending else 0.2)
     assert recall.speaker is not None
     assert recall.speaker.tolist() == [0] * 6 + [1] * 6
     assert (recall.similarity > 0).all()
@@ -85,7 +86,7 @@ def test_chunks_change_no_bit(make: Make) -> None:
 def test_many_rows_are_asked_some_at_a_time(make: Make, monkeypatch: pytest.MonkeyPatch) -> None:
     made, asked = make(bank(dim=4000)), []
     query = made.query
-    monkeypatch.setattr(made, "query", lambda conditions: asked.append(len(conditions)) or query(conditions))
+    monkeypatch.setattr(made, "query", lambda conditions: asked.append(len(conditions[0])) or query(conditions))
     readings = random_pairs(1500, seed=2).sensors
     whole = parts(made(readings))
     assert sum(asked) == 1500

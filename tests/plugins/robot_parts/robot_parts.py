@@ -150,7 +150,7 @@ class Hysteresis(Policy):
 
     def query(self, conditions: Tensor) -> Recall:
         """The answer at the start of an episode: the most familiar behaviour's."""
-        answers = [part.query(conditions) for part in self.parts]
+        answers = self.answers(conditions)
         return _spoken(answers, torch.stack([answer.familiarity for answer in answers]).argmax(0))
 
 

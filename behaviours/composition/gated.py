@@ -1,0 +1,66 @@
+"""Combine behaviours in one vector, each behind a context of its own."""
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Int64, Shaped
+from torch import Tensor
+
+from behaviours.algebra import merged_results, weighted_sum
+from behaviours.bank import BehaviourBank
+from behaviours.composition.base import Policy
+from behaviours.memory import ResultMemory
+from behaviours.options import as_int
+from behaviours.recall import Recall, familiarity
+
+
+class Gated(Policy):
+    """All programs in one vector, Σ bind(pᵢ, contextᵢ), which is asked with the context of one behaviour.
+
+    Behaviours that contradict each other do not disturb each other more than unrelated ones do, but the vector needs the
+    dimensions for all pairs together (`torchvsa.capacity.recall_probability`). Who is asked is decided as in
+    `WinnerTakesAll`. All behaviours can recall the results of all.
+
+    Args:
+        bank: The behaviours to combine.
+        seed: Seed of the contexts.
+
+    Source: contexts as roles, Plate 1995; programs with a context, Levy et al. 2013.
+    """
+
+    program: Tensor
+    contexts: Tensor
+
+    def __init__(self, bank: BehaviourBank, seed: int = 0) -> None:
+        super().__init__(bank, bank.names)
+        vsa, device = self.space.vsa, self.space.device
+        generator = torch.Generator().manual_seed(as_int("seed", seed, 0))
+        self.register_buffer("contexts", vsa.random(len(self.names), generator=generator, device=device))
+        self.register_buffer("program", self._joined())
+        results = merged_results([term for part in self.parts for term in part.terms]).to(device)
+        self.memory = ResultMemory(self.space, results)
+
+    def _joined(self) -> Shaped[Tensor, "d"]:
+        vsa = self.space.vsa
+        bound = [
+            vsa.bind(part.program.detach(), context) for part, context in zip(self.parts, self.contexts, strict=True)
+        ]
+        return weighted_sum(vsa, [1] * len(bound), bound)
+
+    def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
+        """See `Policy.query`."""
+        answers = [self._answer_of(number, condition) for number, condition in enumerate(conditions)]
+        return self.spoken(answers, self.chosen(conditions, answers))
+
+    def chosen(
+        self, conditions: Sequence[Shaped[Tensor, "batch d"]], answers: Sequence[Recall]
+    ) -> Int64[Tensor, "batch"]:
+        """The behaviour whose context is used."""
+        return self.known(answers).argmax(-1)
+
+    def _answer_of(self, number: int, condition: Shaped[Tensor, "batch d"]) -> Recall:
+        vsa = self.space.vsa
+        program = vsa.unbind(self.program, self.contexts[number])
+        match = vsa.readout(program, self.memory.current_items()).match(condition)
+        familiar = familiarity(condition, self.parts[number].known)
+        return Recall(self.memory.commands[match.index], match.similarity, match.margin, familiar)

@@ -1,0 +1,72 @@
+"""Combine behaviours by the weighted sum of what they recall, before the clean-up."""
+
+from collections.abc import Mapping, Sequence
+
+import torch
+from jaxtyping import Shaped
+from torch import Tensor
+
+from behaviours.algebra import merged_results
+from behaviours.bank import BehaviourBank
+from behaviours.composition.base import Policy
+from behaviours.memory import ResultMemory
+from behaviours.options import as_bool
+from behaviours.recall import Recall
+from torchvsa._numerics import norms
+from torchvsa.memory import best
+
+
+class MotorSchema(Policy):
+    """The noisy results of all behaviours are added, weighted, and cleaned up once: Σ wᵢ aᵢ unbind(pᵢ, cᵢ).
+
+    aᵢ is the familiarity of behaviour i with its condition cᵢ, so that one who does not know it is hardly heard. Unlike in
+    a `Bundle`, behaviours may use different sensors. The speaker is the behaviour that contributes most to the score of
+    the recalled result; `similarity` is the mean of the behaviours' cosines with it, weighted by what each adds;
+    `familiarity` is the speaker's.
+
+    Args:
+        bank: The behaviours to combine.
+        weights: Weights wᵢ by name; 1 for behaviours that are not named.
+        familiarity: Whether to weigh by familiarity; without it, this is the sum of scores, as in a `Bundle`.
+
+    Source: Arkin 1989, "Motor schema-based mobile robot navigation".
+    """
+
+    _weights: Tensor
+
+    def __init__(
+        self, bank: BehaviourBank, weights: Mapping[str, float] | None = None, familiarity: bool = True
+    ) -> None:
+        super().__init__(bank, bank.names)
+        self.weights = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
+        """One weight per name."""
+        if not any(self.weights):
+            raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
+        self.familiarity = as_bool("familiarity", familiarity)
+        row = torch.tensor(self.weights, dtype=torch.float64, device=self.space.device)
+        self.register_buffer("_weights", row, persistent=False)
+        results = merged_results([term for part in self.parts for term in part.terms]).to(self.space.device)
+        self.memory = ResultMemory(self.space, results)
+
+    def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
+        """See `Policy.query`."""
+        items = self.memory.current_items()
+        answers = self.answers(conditions)
+        cosines = torch.stack(
+            [
+                self.space.vsa.readout(part.program, items).cosines(condition)
+                for part, condition in zip(self.parts, conditions, strict=True)
+            ],
+            1,
+        )
+        loudness = self._weights * torch.stack([norms(part.program) for part in self.parts]).flatten()
+        if self.familiarity:
+            loudness = loudness * torch.stack([recall.familiarity.double() for recall in answers], -1)
+        loudness = loudness.expand(len(cosines), -1)
+        shares = loudness[..., None] * cosines
+        match = best(shares.sum(1), loudness.abs().sum(-1))
+        winner = match.index[:, None, None].expand(-1, shares.shape[1], 1)
+        spoken = self.spoken(answers, shares.gather(-1, winner)[..., 0].argmax(-1))
+        return spoken._replace(
+            commands=self.memory.commands[match.index], similarity=match.similarity, margin=match.margin
+        )
