@@ -54,7 +54,9 @@ class Mirrored(Product):
         super().__init__(values if shared else _paired_values(list(values), self.pairs), sensors, seed)
         last = max(max(pair) for pair in self.pairs)
         if last >= self.sensors:
-            raise ValueError(f"pairs name column {last}; with {self.sensors} sensors the last one is {self.sensors - 1}")
+            raise ValueError(
+                f"pairs name column {last}; with {self.sensors} sensors the last one is {self.sensors - 1}"
+            )
 
     def own_layout(self) -> Layout:
         """`roles`: one per pair and per sensor without a partner."""
