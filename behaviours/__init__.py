@@ -2,6 +2,17 @@
 
 from typing import TYPE_CHECKING, Any
 
+from behaviours.analysis import (
+    Change,
+    Explanation,
+    Recognition,
+    distance,
+    distances,
+    explain,
+    recognise,
+    switching_weight,
+    switching_weights,
+)
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition import POLICIES, Bundle, Policy, Priority
@@ -26,10 +37,12 @@ __all__ = [
     "Behaviour",
     "BehaviourBank",
     "Bundle",
+    "Change",
     "Controller",
     "ConvergenceWarning",
     "Demonstrations",
     "ErrorDriven",
+    "Explanation",
     "FrozenBehaviour",
     "Gradient",
     "LearningReport",
@@ -38,11 +51,18 @@ __all__ = [
     "Policy",
     "Priority",
     "Recall",
+    "Recognition",
     "Rule",
     "Schema",
     "Sensor",
     "Space",
+    "distance",
+    "distances",
+    "explain",
     "quantile_edges",
+    "recognise",
+    "switching_weight",
+    "switching_weights",
 ]
 
 
