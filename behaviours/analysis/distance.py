@@ -13,8 +13,13 @@ from torchvsa._numerics import cosines
 def distance(a: Behaviour, b: Behaviour) -> float:
     """1 minus the cosine of two programs: 0 for the same direction, 1 for unrelated ones, 2 for opposite ones.
 
-    The programs of behaviours that were trained on similar readings are the farther apart, the more often the
-    behaviours answer differently. No reading is asked. A zero program has distance 1 to every other.
+    The programs of behaviours that learned from similar readings are the farther apart, the more often the behaviours
+    answer differently. No reading is asked. A zero program has distance 1 to every other.
+
+    For 30 variants of the corral's teacher that were trained on readings spread over the ranges of the sensors, the
+    rank correlation with disagreement is about .94. It falls to about .4 on the readings of its runs, many of which
+    resemble each other: training gives the pairs near a threshold most of the weight
+    (`experiments.composition.algebra.distance`).
 
     Raises `ValueError` for behaviours over different spaces, whose programs are unrelated.
     """
