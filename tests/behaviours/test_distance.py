@@ -13,6 +13,7 @@ from behaviours import BehaviourBank, Demonstrations, OneShot, distance, distanc
 from torchvsa import ARCHITECTURES
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_distance_follows_disagreement(seed: int) -> None:
     rules = variants(14, seed)

@@ -28,7 +28,7 @@ from behaviours import (
 )
 from behaviours.learning import Rule
 from behaviours.storage import load_tensors, save_tensors
-from torchvsa.encoders import FractionalPower, Level, Lookup, Mirrored, Product
+from torchvsa.encoders import FractionalPower, Level, Lookup, Mirrored, Product, ValueEncoder
 
 SWAP = {"left": "right", "left_motor": "right_motor"}
 ELEMENTWISE = [name for name in torchvsa.ARCHITECTURES if torchvsa.architecture(name, 64).elementwise]
@@ -48,6 +48,7 @@ def same(a: Behaviour, b: Behaviour) -> bool:
     return all(x.dtype == y.dtype and torch.equal(x, y) for x, y in tensors) and a.report == b.report
 
 
+@pytest.mark.slow
 @given(
     readings=st.lists(
         st.lists(st.one_of(st.just(math.nan), st.floats(0, 20)), min_size=3, max_size=3), min_size=1, max_size=5
@@ -238,7 +239,36 @@ def test_the_side_of_a_pair_does_not_matter() -> None:
     assert torch.equal(shown.mirror()(MIRRORED.sensors).commands, shown(READINGS).commands[:, [1, 0]])
 
 
+class Computed(ValueEncoder):
+    """Codes of levels that no codebook holds."""
+
+    name = "computed"
+    bins = 3
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.vsa = VSA
+        self._own(None)
+
+    def own_layout(self) -> dict[str, Any]:
+        return {}
+
+    def _draw(self, generator: torch.Generator | None) -> dict[str, torch.Tensor]:
+        return {}
+
+    def config(self) -> dict[str, Any]:
+        return {"name": self.name}
+
+    def cells(self, x: torch.Tensor) -> torch.Tensor:
+        return (x * 2).long()
+
+    def encode(self, cells: torch.Tensor) -> torch.Tensor:
+        return VSA.identity().expand(*cells.shape, -1)
+
+
 def test_command_codes_have_bins() -> None:
+    with pytest.raises(ValueError, match="such as Balanced; got Computed"):
+        Space(SCHEMA, vsa=VSA, command_codes=Computed(), mirror=SWAP)
     vsa = torchvsa.FHRR(64)
     with pytest.raises(ValueError, match="bins"):
         Space(SCHEMA, vsa=vsa, command_codes=FractionalPower(vsa), mirror=SWAP)

@@ -6,6 +6,7 @@ from behaviours import OneShot
 from experiments.composition import algebra
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::behaviours.ConvergenceWarning")
 def test_what_is_measured_is_what_theory_says() -> None:
     (row,) = algebra.mirrored([0], demonstrations=6, tested=20)
@@ -17,6 +18,7 @@ def test_what_is_measured_is_what_theory_says() -> None:
     assert algebra.removal(0, demonstrations=6)
 
 
+@pytest.mark.slow
 def test_distance_and_recognition_have_their_ceilings() -> None:
     near = algebra.distance(0, "uniform", OneShot(), count=8, shown=100, tested=500)
     assert near["pairs"] == 28

@@ -104,7 +104,10 @@ def check_mirrored_dim(vsa: VSA) -> None:
 
 def _checked_pairs(pairs: Sequence[Sequence[int]]) -> tuple[tuple[int, int], ...]:
     what = "pairs are pairs of different columns, such as [(0, 1)], each column at most once"
-    given = [tuple(whole_number(column, what) for column in pair) for pair in pairs]
+    try:
+        given = [tuple(whole_number(column, what) for column in pair) for pair in pairs]
+    except TypeError:
+        raise ValueError(f"{what}; got {pairs!r:.80}") from None
     columns = [column for pair in given for column in pair]
     if not given or any(len(pair) != 2 for pair in given) or len(set(columns)) < len(columns) or min(columns) < 0:
         raise ValueError(f"{what}; got {pairs!r:.80}")

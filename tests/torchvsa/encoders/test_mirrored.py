@@ -77,6 +77,7 @@ WRONG: dict[str, Any] = {
     r"each column at most once; got \[\]": lambda: Mirrored(LEVEL, [], 3),
     r"each column at most once; got \[\(0, 1, 2\)": lambda: Mirrored(LEVEL, [(0, 1, 2)], 3),
     r"each column at most once; got \[\(-1": lambda: Mirrored(LEVEL, [(-1, 0)], 3),
+    r"each column at most once; got \[0, 1\]": lambda: Mirrored(LEVEL, [0, 1], 3),  # type: ignore[list-item]
     "each column at most once; got 'left'": lambda: Mirrored(LEVEL, [("left", "right")], 3),  # type: ignore[list-item]
     "pairs name column 3; with 3 sensors the last one is 2": lambda: Mirrored(LEVEL, [(0, 3)], 3),
     "sensors 0 and 1 are a pair": lambda: Mirrored([LEVEL, Level(MAP, 9), LEVEL], [(0, 1)]),
