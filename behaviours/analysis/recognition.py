@@ -41,7 +41,7 @@ class Recognition:
         return "; ".join(shown) + (f"; and {len(self) - 10} more" if len(self) > 10 else "")
 
 
-def recognise(bank: BehaviourBank, readings: Any, commands: Any, runs: Int64[Tensor, "N"] | None = None) -> Recognition:
+def recognise(bank: BehaviourBank, readings: Any, commands: Any, runs: Any = None) -> Recognition:
     """Find the behaviour of a bank that a robot is running.
 
     At each step a behaviour is charged for a command that it would not have given: min(0, score of the command that was
