@@ -70,10 +70,10 @@ class Explanation:
         if self.commands[row].isnan().any():
             return "No sensor was observed, so that there is no command."
         commands = _commands(actuators, self.commands[row].tolist())
-        speaker = f"{self.speaker[row]} answered" if self.speaker[row] else "The answer"
+        speaker = f"{self.speaker[row]} answered with" if self.speaker[row] else "The answer has"
         return (
             f"{read}: {commands}.\n"
-            f"  {speaker} with a margin of {self.margin[row]:.2g} and a familiarity of {self.familiarity[row]:.2g}.\n"
+            f"  {speaker} a margin of {self.margin[row]:.2g} and a familiarity of {self.familiarity[row]:.2g}.\n"
             f"  {self._decisive(row)}\n"
             f"  {self._nearest(row)}"
         )

@@ -125,7 +125,7 @@ def test_one_result_never_changes() -> None:
     assert explanation.nearest == (None,)
     assert not explanation.changed.any()
     assert (explanation.margin_drop == 0).all()
-    assert "The answer with a margin of inf" in str(explanation)
+    assert "The answer has a margin of inf" in str(explanation)
     assert "The answer is the same without any one of the sensors." in str(explanation)
     assert "No change of a single reading would change it." in str(explanation)
 
