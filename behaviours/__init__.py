@@ -2,6 +2,17 @@
 
 from typing import TYPE_CHECKING, Any
 
+from behaviours.analysis import (
+    Change,
+    Explanation,
+    Recognition,
+    distance,
+    distances,
+    explain,
+    recognise,
+    switching_weight,
+    switching_weights,
+)
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition import (
@@ -38,10 +49,12 @@ __all__ = [
     "BehaviourBank",
     "Blending",
     "Bundle",
+    "Change",
     "Controller",
     "ConvergenceWarning",
     "Demonstrations",
     "ErrorDriven",
+    "Explanation",
     "FrozenBehaviour",
     "Gated",
     "Gradient",
@@ -52,6 +65,7 @@ __all__ = [
     "Policy",
     "Priority",
     "Recall",
+    "Recognition",
     "Rule",
     "Schema",
     "Sensor",
@@ -59,7 +73,13 @@ __all__ = [
     "Space",
     "Vote",
     "WinnerTakesAll",
+    "distance",
+    "distances",
+    "explain",
     "quantile_edges",
+    "recognise",
+    "switching_weight",
+    "switching_weights",
 ]
 
 

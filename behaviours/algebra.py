@@ -16,6 +16,8 @@ from torchvsa import VSA
 from torchvsa._numerics import as_bipolar, is_integer
 
 _LARGEST = 2**53
+_MIRROR = "mirror of "
+"""Begins the fingerprint of a mirror image; the rest is that of the behaviour that was learned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +45,13 @@ class Term:
         if self.weight == 0:
             raise ValueError("the weight of a term cannot be 0")
 
+    @property
+    def mirrored(self) -> bool:
+        """Whether it is the mirror image of the behaviour that was learned."""
+        return self.fingerprint.startswith(_MIRROR)
+
     def __str__(self) -> str:
-        name = self.name or self.report.rule
+        name = ("mirror of " if self.mirrored else "") + (self.name or self.report.rule)
         return name if self.weight == 1 else f"-{name}" if self.weight == -1 else f"{self.weight:g} * {name}"
 
 
@@ -62,6 +69,12 @@ def merge_terms(terms: Sequence[Term]) -> tuple[Term, ...]:
         total[term.fingerprint] = total.get(term.fingerprint, 0) + term.weight
         first.setdefault(term.fingerprint, term)
     return tuple(replace(term, weight=total[key]) for key, term in first.items() if total[key])
+
+
+def mirrored_term(term: Term, results: Int64[Tensor, "k m"]) -> Term:
+    """The mirror image of a term, whose results are `results`. The mirror image of a mirror image is the term."""
+    mirrored = term.fingerprint.removeprefix(_MIRROR) if term.mirrored else _MIRROR + term.fingerprint
+    return replace(term, results=results, fingerprint=mirrored)
 
 
 def merged_results(terms: Sequence[Term]) -> Int64[Tensor, "k m"]:

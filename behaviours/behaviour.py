@@ -9,7 +9,15 @@ import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor, nn
 
-from behaviours.algebra import Term, checked_weight, merge_terms, merged_report, merged_results, weighted_sum
+from behaviours.algebra import (
+    Term,
+    checked_weight,
+    merge_terms,
+    merged_report,
+    merged_results,
+    mirrored_term,
+    weighted_sum,
+)
 from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
 from behaviours.frozen import FrozenBehaviour
@@ -22,6 +30,7 @@ from behaviours.space import Space
 from behaviours.storage import checksum
 from torchvsa import VSA, Readout, ShapeError
 from torchvsa._numerics import as_bipolar, is_integer
+from torchvsa.encoders.mirrored import mirrored
 
 
 class Behaviour(Controller):
@@ -150,6 +159,36 @@ class Behaviour(Controller):
 
     def __truediv__(self, weight: Any) -> "Behaviour":
         return self * (1 / weight) if isinstance(weight, Real) else NotImplemented
+
+    def mirror(self) -> "Behaviour":
+        """The mirror image: it answers mirrored readings with mirrored commands.
+
+        With the space's sensors and actuators exchanged as `Space(mirror=...)` names them, for behaviour `b`:
+
+            b.mirror()(exchanged readings).commands == exchanged b(readings).commands
+
+        Program and known conditions are rotated by d / 2, and the levels of paired actuators exchanged. What was
+        learned on one side is known on both by `b + b.mirror()`. The program of the mirror image is detached.
+
+        Raises `ValueError` for a space without a mirror.
+        """
+        mirror = self.space.mirror
+        if mirror is None:
+            raise ValueError(
+                "this behaviour has no mirror image, since its space does not say which sensors and actuators swap; "
+                "make it with Space(..., mirror={'light_left': 'light_right', 'left_motor': 'right_motor'}) and learn "
+                "again"
+            )
+        terms = [mirrored_term(term, mirror.swapped(term.results)) for term in self.terms]
+        program, known = (mirrored(vector) for vector in (self.program.detach(), self.known))
+        results = mirror.swapped(self.results)
+        space = self.space.using(mirror.exchanged(self.space.sensors))
+        # The mirror image of a mirror image is what was learned.
+        learned = len(terms) == 1 and terms[0].weight == 1 and not terms[0].mirrored
+        report = terms[0].report if learned else merged_report(terms)
+        image = Behaviour(space, program, known, results, report, () if learned else terms)
+        image.threshold = self.threshold
+        return image
 
     @property
     def results(self) -> Int64[Tensor, "k m"]:

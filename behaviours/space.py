@@ -10,6 +10,7 @@ from torch import Tensor, nn
 
 import torchvsa
 from behaviours.default_encoder import check_distinguishable, check_value_bins, default_encoder
+from behaviours.mirroring import Mirror
 from behaviours.options import as_int
 from behaviours.schema import Schema
 from behaviours.storage import Layout, check_layout, error_context
@@ -33,10 +34,13 @@ class Space(nn.Module):
         protection: By default none.
         seed: A whole number.
         command_codes: Encodes the levels of the actuators; by default `Balanced` codes.
+        mirror: The names of sensors that swap in a mirror image of the robot, and the names of actuators that swap, as
+            in `{"light_left": "light_right", "left_motor": "right_motor"}`. Behaviours then have a mirror image, see
+            `Behaviour.mirror`. The encoder is `Mirrored`, by default with `Level` codes of 32 bins.
 
     Raises:
-        ValueError: For parts of different architectures or numbers of sensors, and for an encoder that has the same
-            code for two values of a categorical or binary sensor.
+        ValueError: For parts of different architectures or numbers of sensors, for an encoder that has the same code
+            for two values of a categorical or binary sensor, and for parts that do not mirror what `mirror` names.
     """
 
     _unused: Tensor
@@ -49,13 +53,16 @@ class Space(nn.Module):
         protection: Protection | None = None,
         seed: int = 0,
         command_codes: ValueEncoder | None = None,
+        mirror: Mapping[str, str] | None = None,
     ) -> None:
         super().__init__()
         self.schema, self.seed = schema, as_int("seed", seed, 0, 2**63 - 1)
         _check_kinds(encoder, vsa, protection, command_codes)
         sensors, actuators = len(schema.sensors), schema.actuators
+        self.mirror = None if mirror is None else Mirror(schema, mirror)
         if encoder is None:
-            encoder = default_encoder(schema, vsa or MAP(dim=4000, dtype=torch.int8))
+            vsa = vsa or MAP(dim=4000, dtype=torch.int8)
+            encoder = default_encoder(schema, vsa) if self.mirror is None else self.mirror.encoder(vsa, sensors)
         elif vsa is not None and vsa != encoder.vsa:
             raise ValueError(f"the encoder works on {encoder.vsa}, which is not the given {vsa}; give one of them")
         if encoder.sensors != sensors:
@@ -67,10 +74,14 @@ class Space(nn.Module):
         if result_encoder.bins != most:
             raise ValueError(f"the codes of commands are for {result_encoder.bins} levels; the schema has {most}")
         protection = protection or Unprotected(self.vsa)
+        if self.mirror is not None:
+            self.mirror.check(encoder, protection)
         generator = torch.Generator().manual_seed(self.seed)
         self.encoder = _drawn(encoder, self.vsa, generator)
         check_distinguishable(schema, self.encoder)
         self.result_encoder = _drawn(result_encoder, self.vsa, generator)
+        if self.mirror is not None:
+            self.mirror.apply(self.result_encoder)
         self.protect = _drawn(protection, self.vsa, generator)
         self.sensors = tuple(sensor.name for sensor in schema.sensors)
         """The names of the sensors that are used, see `using`."""
@@ -84,6 +95,8 @@ class Space(nn.Module):
         known = [sensor.name for sensor in self.schema.sensors]
         if isinstance(sensors, str) or not sensors or not set(sensors) <= set(known):
             raise ValueError(f"sensors is a list of names out of {', '.join(known)}; got {sensors!r}")
+        if set(sensors) == set(self.sensors):
+            return self
         view = copy.copy(self)
         view._buffers = {"_unused": torch.tensor([name not in sensors for name in known], device=self.device)}
         view.sensors = tuple(name for name in known if name in sensors)
@@ -144,7 +157,7 @@ class Space(nn.Module):
             "command_codes": self.result_encoder.value.config(),
             "protection": self.protect.config(),
             "seed": self.seed,
-        }
+        } | ({} if self.mirror is None else {"mirror": dict(self.mirror.names)})
 
     def same_as(self, other: "Space") -> bool:
         """Whether configurations and codebooks are equal; devices, and the sensors that are used, may differ."""
@@ -183,8 +196,12 @@ class Space(nn.Module):
                     part.take({key.removeprefix(prefix): t for key, t in codebooks.items() if key.startswith(prefix)})
         result_encoder: Any = parts["result_encoder"]
         made: Any = parts
-        space = cls(schema, made["encoder"], vsa, made["protect"], config["seed"], result_encoder.value)
-        space.result_encoder = result_encoder if result_encoder.drawn else space.result_encoder
+        mirror = config.get("mirror")
+        space = cls(schema, made["encoder"], vsa, made["protect"], config["seed"], result_encoder.value, mirror)
+        if result_encoder.drawn:
+            space.result_encoder = result_encoder
+            if space.mirror is not None:
+                space.mirror.check_applied(result_encoder)
         return space
 
 

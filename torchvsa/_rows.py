@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from torchvsa.architectures import BSC, FHRR, HRR, MAP, VSA
-from torchvsa.encoders import Encoder, Product, SubsetProduct, Sum, ThresholdFeatures
+from torchvsa.encoders import Encoder, Mirrored, Product, SubsetProduct, Sum, ThresholdFeatures
 from torchvsa.encoders.base import ROUNDING, Binned
 from torchvsa.protection import FixedShift, Protection, SelfShift, Unprotected
 
@@ -189,6 +189,7 @@ _ENCODERS: dict[type, Callable[[Any, Verbs], Row | None]] = {
     Sum: lambda encoder, known: _record(encoder, known.bundle),
     Product: lambda encoder, known: _record(encoder, known.bind),
     SubsetProduct: lambda encoder, known: _record(encoder, known.bind),
+    Mirrored: lambda encoder, known: _record(encoder, known.bind),
     ThresholdFeatures: _thresholds,
 }
 

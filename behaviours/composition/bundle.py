@@ -28,8 +28,9 @@ class Bundle(Policy):
             known conditions and results, but stays in `names`.
 
     Raises:
-        ValueError: For behaviours that use different sensors, for weights that are not finite or are all 0, and for sums with elements that could exceed 2^53, up
-            to which float64 represents all integers, or that are so small that their squares underflow.
+        ValueError: For behaviours that use different sensors, for weights that are not finite or are all 0, and for
+            sums with elements that could exceed 2^53, up to which float64 represents all integers, or that are so small
+            that their squares underflow.
     """
 
     _weights: Tensor

@@ -17,8 +17,8 @@ from behaviours.recall import Recall, familiarity
 class Gated(Policy):
     """All programs in one vector, Σ bind(pᵢ, contextᵢ), which is asked with the context of one behaviour.
 
-    Behaviours that contradict each other do not disturb each other more than unrelated ones do, but the vector needs the
-    dimensions for all pairs together (`torchvsa.capacity.recall_probability`). Who is asked is decided as in
+    Behaviours that contradict each other do not disturb each other more than unrelated ones do, but the vector needs
+    the dimensions for all pairs together (`torchvsa.capacity.recall_probability`). Who is asked is decided as in
     `WinnerTakesAll`. All behaviours can recall the results of all.
 
     Args:

@@ -19,9 +19,9 @@ from torchvsa.memory import best
 class MotorSchema(Policy):
     """The noisy results of all behaviours are added, weighted, and cleaned up once: Σ wᵢ aᵢ unbind(pᵢ, cᵢ).
 
-    aᵢ is the familiarity of behaviour i with its condition cᵢ, so that one who does not know it is hardly heard. Unlike in
-    a `Bundle`, behaviours may use different sensors. The speaker is the behaviour that contributes most to the score of
-    the recalled result; `similarity` is the mean of the behaviours' cosines with it, weighted by what each adds;
+    aᵢ is the familiarity of behaviour i with its condition cᵢ, so that one who does not know it is hardly heard. Unlike
+    in a `Bundle`, behaviours may use different sensors. The speaker is the behaviour that contributes most to the score
+    of the recalled result; `similarity` is the mean of the behaviours' cosines with it, weighted by what each adds;
     `familiarity` is the speaker's.
 
     Args:

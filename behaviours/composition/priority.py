@@ -16,8 +16,8 @@ class Priority(Policy):
     """Subsumption: the first behaviour in `order` whose familiarity is above its threshold answers.
 
     If there is none, the one that comes nearest to its threshold does. By default a threshold is what nearly all of the
-    behaviour's own conditions reach (`Behaviour.threshold`); where that is unknown, as for sums, it is half of 1/√k, the
-    familiarity of one of k unrelated conditions.
+    behaviour's own conditions reach (`Behaviour.threshold`); where that is unknown, as for sums, it is half of 1/√k,
+    the familiarity of one of k unrelated conditions.
 
     Args:
         bank: The behaviours to combine.

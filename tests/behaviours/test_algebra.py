@@ -2,6 +2,7 @@
 
 import copy
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,16 @@ from hypothesis import strategies as st
 from robots import random_pairs, same_bits, space
 from torch.testing import assert_close
 
-from behaviours import Behaviour, BehaviourBank, Bundle, Demonstrations, ErrorDriven, LearningReport, OneShot
+from behaviours import (
+    Behaviour,
+    BehaviourBank,
+    Bundle,
+    ConvergenceWarning,
+    Demonstrations,
+    ErrorDriven,
+    LearningReport,
+    OneShot,
+)
 from torchvsa import ARCHITECTURES
 from torchvsa._numerics import as_bipolar
 
@@ -75,6 +85,26 @@ def test_what_is_taken_away_again_leaves_no_trace(vsa: str) -> None:
     opposite = -everything
     assert same(-opposite, everything)
     assert same(sum([seek, avoid, flee]), everything)  # type: ignore[arg-type] (`sum` begins with 0)
+
+
+@given(
+    parts=st.tuples(
+        *[st.tuples(st.integers(1, 12), st.integers(0, 9), st.sampled_from(["one_shot", "error_driven"]))] * 3
+    ),
+    vsa=st.sampled_from(["MAP-C", "MAP-I", "MAP-B", "BSC"]),
+    weight=st.integers(-5, 5).filter(bool),
+)
+@settings(max_examples=40, deadline=None, derandomize=True)
+def test_removal_is_exact(parts: Any, vsa: str, weight: int) -> None:
+    made = space(200, vsa, protection="none")
+    rules = {"one_shot": OneShot(), "error_driven": ErrorDriven(epochs=3)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ConvergenceWarning)
+        a, b, c = (rules[rule].fit(made, random_pairs(count, seed)) for count, seed, rule in parts)
+    fingerprints = {part.terms[0].fingerprint for part in (a, b, c)}
+    if len(fingerprints) == 3:
+        assert same((a + weight * b + c) - weight * b, a + c)
+        assert same(a + weight * b - a, weight * b)
 
 
 def test_results_are_counted() -> None:

@@ -7,6 +7,7 @@ from torchvsa.encoders.fractional_power import FractionalPower
 from torchvsa.encoders.history import History
 from torchvsa.encoders.level import Level
 from torchvsa.encoders.lookup import Lookup
+from torchvsa.encoders.mirrored import Mirrored
 from torchvsa.encoders.product import Product
 from torchvsa.encoders.random_fourier import RandomFourier
 from torchvsa.encoders.record import Record
@@ -19,7 +20,7 @@ from torchvsa.part import Part
 
 for part in (Lookup, Level, Balanced, Thermometer, Circular, FractionalPower):
     VALUE_ENCODERS.register(part.name, part)
-for part in (Sum, Product, SubsetProduct, ThresholdFeatures, RandomFourier, History):
+for part in (Sum, Product, SubsetProduct, ThresholdFeatures, RandomFourier, History, Mirrored):
     ENCODERS.register(part.name, part)
 
 __all__ = [
@@ -33,6 +34,7 @@ __all__ = [
     "History",
     "Level",
     "Lookup",
+    "Mirrored",
     "Part",
     "Product",
     "RandomFourier",

@@ -163,7 +163,8 @@ class Record(Encoder):
             f"a record of {self.sensors:,} sensors with {bins:,} bins at d = {self.vsa.dim:,}",
             "take fewer sensors, bins or dimensions, or ThresholdFeatures, which keep no table",
         )
-        drawn = {"roles": self.vsa.random(self.sensors, generator=generator)}
+        _, (roles, _) = self.own_layout()["roles"]
+        drawn = {"roles": self.vsa.random(roles, generator=generator)}
         self.draw_parts(generator)
         return drawn | dict(self._arrange(generator))
 

@@ -19,6 +19,7 @@ from torchvsa.encoders import (
     History,
     Level,
     Lookup,
+    Mirrored,
     Product,
     RandomFourier,
     SubsetProduct,
@@ -44,12 +45,15 @@ ROWS: dict[str, Callable[[VSA], Encoder]] = {
     "threshold_features": lambda vsa: ThresholdFeatures(vsa, 3, 9, 2),
     "random_fourier": lambda vsa: RandomFourier(vsa, 3),
     "history": lambda vsa: History(Sum(Level(vsa, 8), 2), [1, 3]),
+    "mirrored": lambda vsa: Mirrored(Level(vsa, 8), [(0, 2)], 4),
 }
 EDGES = [torch.tensor([0.25, 0.5]), torch.tensor([0.125, 0.125, 0.75])]
 NONE = torch.tensor([])
 MORE: dict[str, Callable[[VSA], Encoder]] = {
     "sum of mixed bins": lambda vsa: Sum([Level(vsa, 8), Circular(vsa, 6), Lookup(vsa, 3)]),
     "subset product of mixed bins": lambda vsa: SubsetProduct([Level(vsa, 8), Circular(vsa, 6), Lookup(vsa, 3)]),
+    "mirrored of mixed bins": lambda vsa: Mirrored([Level(vsa, 8), Level(vsa, 8), Lookup(vsa, 3)], [(0, 1)]),
+    "mirrored powers": lambda vsa: Mirrored(FractionalPower(vsa), [(0, 1)], 3),
     "product of powers": lambda vsa: Product(FractionalPower(vsa), 2),
     "sum of powers and bins": lambda vsa: Sum([FractionalPower(vsa), Level(vsa, 8)]),
     "waves": lambda vsa: RandomFourier(vsa, 2, sign=False),
@@ -64,10 +68,12 @@ MORE: dict[str, Callable[[VSA], Encoder]] = {
     "history of powers": lambda vsa: History(Sum(FractionalPower(vsa), 2), [2]),
     "history of edges": lambda vsa: History(ThresholdFeatures(vsa, 2, 9, edges=EDGES), [1]),
 }
-POWERS = ("fractional_power", "product of powers", "sum of powers and bins", "history of powers")
+POWERS = ("fractional_power", "mirrored powers", "product of powers", "sum of powers and bins", "history of powers")
 NEEDS: dict[str, Callable[[VSA], bool]] = {
     **dict.fromkeys(("subset_product", "subset product of mixed bins"), lambda vsa: vsa.elementwise),
+    **dict.fromkeys(("mirrored", "mirrored of mixed bins"), lambda vsa: vsa.elementwise and vsa.dim % 2 == 0),
     **dict.fromkeys(POWERS, lambda vsa: vsa.frequencies is not None),
+    "mirrored powers": lambda vsa: vsa.elementwise and vsa.frequencies is not None and vsa.dim % 2 == 0,
     "random_fourier": lambda vsa: vsa.elementwise and not vsa.dtype.is_complex and vsa.dtype != torch.bool,
     "waves": lambda vsa: vsa.elementwise and vsa.dtype.is_floating_point,
 }

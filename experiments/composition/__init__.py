@@ -1,0 +1,1 @@
+"""How behaviours combine."""
