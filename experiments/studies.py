@@ -1,7 +1,9 @@
-"""All studies: each module and package here that is not shared registers what it defines when it is imported."""
+"""All studies: each module here that is not shared, or in a package that is not, registers what it defines."""
 
 import pkgutil
+from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 
 import experiments
 from experiments.kit import STUDIES, Study
@@ -16,20 +18,30 @@ of several options: `group=option` chooses one, `group.setting=value` changes it
 
 _SHARED = ("__main__", "main", "studies", "kit", "models", "tasks")
 
-_MODULES = [module.name for module in pkgutil.iter_modules(experiments.__path__) if module.name not in _SHARED]
+
+def _modules() -> Iterator[str]:
+    for module in pkgutil.iter_modules(experiments.__path__):
+        if module.name not in _SHARED:
+            yield module.name
+            inner = pkgutil.iter_modules([str(Path(experiments.__path__[0], module.name))])
+            yield from (f"{module.name}.{one.name}" for one in inner)
 
 
 def import_all() -> None:
     """Import every module of studies, which takes seconds."""
-    for module in _MODULES:
+    for module in _modules():
         import_module(f"experiments.{module}")
 
 
 def find(name: str) -> Study:
-    """The study of this name; if a module has its name, no other one is imported. Raises `ValueError` for no study."""
-    if name in _MODULES:
-        import_module(f"experiments.{name}")
-    else:
+    """The study of this name. If a module has the name, that one is imported, and others if it needs them.
+
+    Raises `ValueError` if there is no such study.
+    """
+    own = min((module for module in _modules() if module.split(".")[-1] == name), key=len, default=None)
+    if own is not None:
+        import_module(f"experiments.{own}")
+    if own is None or name not in STUDIES:
         import_all()
     return STUDIES.find(name)
 

@@ -149,13 +149,18 @@ def running(pid: int) -> bool:
 def test_a_signal_ends_a_command_as_an_exception_does(
     number: signal.Signals, code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    before, cleaned = signal.getsignal(number), False
-    with pytest.raises(SystemExit) as exit_, ended_by_signals():
-        try:
-            os.kill(os.getpid(), number)
-            time.sleep(10)
-        finally:
-            cleaned = True
+    before, cleaned = signal.getsignal(number), []
+
+    def job() -> None:
+        with ended_by_signals():
+            try:
+                os.kill(os.getpid(), number)
+                time.sleep(10)
+            finally:
+                cleaned.append(True)
+
+    with pytest.raises(SystemExit) as exit_:
+        job()
     assert exit_.value.code == code
     assert cleaned
     assert f"{number.name}; the same command goes on from here" in capsys.readouterr().err
