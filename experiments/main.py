@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-import experiments.studies
+from experiments import studies
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.run import draw, load
@@ -24,10 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         draw_again(rest)
         return
     if name == "settings":
-        print(experiments.studies.settings_page(), end="")
+        print(studies.settings_page(), end="")
         return
     with errors_in_one_line("torchvsa"):
-        study = STUDIES.find(name)
+        study = studies.find(name)
     run_study(study, rest)
 
 
@@ -38,6 +38,7 @@ def corral() -> None:
 
 def draw_again(arguments: Sequence[str]) -> None:
     """Draw the pages of finished runs again, from their results."""
+    studies.import_all()
     with errors_in_one_line("torchvsa draw"):
         if not arguments:
             raise ValueError("which folder? give one that holds results.json")
@@ -49,6 +50,7 @@ def draw_again(arguments: Sequence[str]) -> None:
 
 def print_commands(console: Console) -> None:
     """What can be run."""
+    studies.import_all()
     table = Table(title="torchvsa COMMAND setting=value ...; COMMAND --help lists its settings", box=None)
     table.add_column("command", no_wrap=True)
     table.add_column("what it answers or does")

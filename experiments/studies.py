@@ -1,10 +1,12 @@
-"""All studies: importing this module imports every module and package of studies, which register what they define."""
+"""All studies: each module here that is not shared, or in a package that is not, registers what it defines."""
 
 import pkgutil
+from collections.abc import Iterator
 from importlib import import_module
+from pathlib import Path
 
 import experiments
-from experiments.kit import STUDIES
+from experiments.kit import STUDIES, Study
 from experiments.kit.help import groups, markdown, markdown_of_group
 
 _TITLE = """<!-- Written by `torchvsa settings`; a test compares the two. -->
@@ -16,13 +18,37 @@ of several options: `group=option` chooses one, `group.setting=value` changes it
 
 _SHARED = ("__main__", "main", "studies", "kit", "models", "tasks")
 
-for _module in pkgutil.iter_modules(experiments.__path__):
-    if _module.name not in _SHARED:
-        import_module(f"experiments.{_module.name}")
+
+def _modules() -> Iterator[str]:
+    for module in pkgutil.iter_modules(experiments.__path__):
+        if module.name not in _SHARED:
+            yield module.name
+            inner = pkgutil.iter_modules([str(Path(experiments.__path__[0], module.name))])
+            yield from (f"{module.name}.{one.name}" for one in inner)
+
+
+def import_all() -> None:
+    """Import every module of studies, which takes seconds."""
+    for module in _modules():
+        import_module(f"experiments.{module}")
+
+
+def find(name: str) -> Study:
+    """The study of this name. If a module has the name, that one is imported, and others if it needs them.
+
+    Raises `ValueError` if there is no such study.
+    """
+    own = min((module for module in _modules() if module.split(".")[-1] == name), key=len, default=None)
+    if own is not None:
+        import_module(f"experiments.{own}")
+    if own is None or name not in STUDIES:
+        import_all()
+    return STUDIES.find(name)
 
 
 def settings_page() -> str:
     """All settings of the studies of this project, and the options of all groups, as a page of the docs."""
+    import_all()
     here = [study for _, study in sorted(STUDIES.items()) if study.settings.__module__.startswith("experiments.")]
     studies = "\n\n".join(map(markdown, here))
     used = dict.fromkeys(group for study in here for group in groups(study.settings))

@@ -12,7 +12,7 @@ import sim
 from experiments.corral import figures, tables
 from experiments.corral.forgetting import ABOUT, CLIPPED, by_age
 from experiments.corral.trajectories import as_rollout, driven_episodes, representative_episode
-from experiments.kit import Outcome, Page, Study
+from experiments.kit import Outcome, Page
 from sim import render
 
 DRAWN = ("teacher", "default", "bundled", "paper", "paper_best_bins", "hand_written", "random")
@@ -61,23 +61,7 @@ class Run:
         }
 
 
-def headline(outcome: Outcome) -> str:
-    """From how many starts the robot reaches the lamp."""
-    reached = {
-        row["controller"]: f"{row['success_rate'] * row['episodes']:,.0f} of {row['episodes']:,} starts"
-        for row in outcome.table
-    }
-    if "default" not in reached:
-        return f"The robot reaches the lamp: {', '.join(f'`{name}` from {count}' for name, count in reached.items())}."
-    others = [f"; `{name}` from {reached[name]}" for name in ("teacher", "paper") if name in reached]
-    dim = outcome.config["vsa"]["dim"]
-    return (
-        f"One hypervector of {dim:,} numbers drives the robot to the lamp from {reached['default']} that it never "
-        f"saw{''.join(others)}."
-    )
-
-
-def page(page: Page, outcome: Outcome, study: Study) -> None:
+def fill(page: Page, outcome: Outcome) -> None:
     """Fill the page with all that the run has something to show for."""
     run = Run(outcome)
     for add in (_table, _corral, _maps, _timelines, _printed, _failures):

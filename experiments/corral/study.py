@@ -14,10 +14,9 @@ import pandas as pd
 from experiments.corral import tables
 from experiments.corral.controllers import original
 from experiments.corral.measure import measure, prepare
-from experiments.corral.page import headline, page
 from experiments.corral.settings import PRESETS, Corral, check
 from experiments.corral.trajectories import driven_episodes
-from experiments.kit import Cell, Row, Study, grid
+from experiments.kit import Cell, Outcome, Page, Row, Study, grid
 from experiments.kit.intervals import proportion
 
 SLOWEST = (
@@ -60,6 +59,29 @@ def metrics(settings: Corral, records: pd.DataFrame, table: list[Row]) -> dict[s
         for row in learned.to_dict(orient="records")
         for count in counts
     }
+
+
+def headline(outcome: Outcome) -> str:
+    """From how many starts the robot reaches the lamp."""
+    reached = {
+        row["controller"]: f"{row['success_rate'] * row['episodes']:,.0f} of {row['episodes']:,} starts"
+        for row in outcome.table
+    }
+    if "default" not in reached:
+        return f"The robot reaches the lamp: {', '.join(f'`{name}` from {count}' for name, count in reached.items())}."
+    others = [f"; `{name}` from {reached[name]}" for name in ("teacher", "paper") if name in reached]
+    dim = outcome.config["vsa"]["dim"]
+    return (
+        f"One hypervector of {dim:,} numbers drives the robot to the lamp from {reached['default']} that it never "
+        f"saw{''.join(others)}."
+    )
+
+
+def page(page: Page, outcome: Outcome, study: Study) -> None:
+    """Fill the page with all that the run has something to show for."""
+    from experiments.corral.page import fill  # with Matplotlib, without which the cells are measured
+
+    fill(page, outcome)
 
 
 study = Study(

@@ -1,5 +1,5 @@
-"""What does one hypervector do where it was not shown? Three studies, each in a file of its own."""
+"""What does one hypervector do where it was not shown? Three studies, each in a file of its own; the corral's leads."""
 
-from experiments.generalisation import corral, smooth, wall_following
+from experiments.generalisation.corral import study
 
-__all__ = ["corral", "smooth", "wall_following"]
+__all__ = ["study"]

@@ -1,16 +1,20 @@
-"""The style of all figures, and curves of tidy frames with seaborn."""
+"""The style of all figures, and curves of tidy frames with seaborn.
+
+Matplotlib and seaborn are imported by what draws, for that takes a second, and processes that measure draw nothing.
+"""
 
 from __future__ import annotations
 
 import io
 import itertools
-from collections.abc import Collection, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-import matplotlib
 import pandas as pd
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 # Okabe and Ito's colours, which stay apart for colour-blind readers, and two that go with them.
 BLACK, ORANGE, SKY, GREEN = "#222222", "#E69F00", "#56B4E9", "#009E73"
@@ -42,8 +46,18 @@ STYLE: Any = {
 }
 
 
+def drawn(draw: Callable[[], Figure]) -> bytes:
+    """What `draw` draws in the style of all figures, as the bytes of a PNG file."""
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):
+        return png(draw())
+
+
 def png(figure: Figure, dpi: int = 120) -> bytes:
     """A figure as the bytes of a PNG file; the same figure gives the same bytes."""
+    import matplotlib
+
     buffer = io.BytesIO()
     with matplotlib.rc_context(STYLE):
         # Without the version of matplotlib, which it would write into the file.
@@ -83,7 +97,7 @@ def lines(
     of the names `dashed` are dashed. Lines that are `apart` are each moved by this much along x against the one before,
     and have bars instead of bands, so that no interval hides another.
     """
-    import seaborn  # takes a second to load
+    import seaborn
 
     names = [name for name in order or dict.fromkeys(frame[hue]) if (frame[hue] == name).any()]
     chosen = looks(names, fixed)
@@ -126,6 +140,8 @@ def panels(
 
     `size` is that of a panel in inches; `looks` are options of `lines`. Returns the panels by the two values.
     """
+    from matplotlib.figure import Figure
+
     rows, columns = frame[row].unique(), frame[column].unique()
     width, height = size[0] * len(columns), size[1] * len(rows)
     figure = Figure(figsize=(max(0.9 + width, 5.4), 0.9 + height), layout="constrained")

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 LEVEL = 0.95
 
@@ -16,6 +15,8 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
 
     Source: Wilson 1927.
     """
+    from scipy import stats  # takes half a second to load
+
     found = stats.binomtest(successes, trials).proportion_ci(LEVEL, method="wilson")
     return float(found.low), float(found.high)
 

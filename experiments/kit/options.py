@@ -100,12 +100,17 @@ def described_option(group: str, option: str) -> list[tuple[str, str, str]]:
     return rows
 
 
+_registered: dict[tuple[str, str], tuple[Group, Any]] = {}
+"""What Hydra's store has already, by group and name."""
+
+
 def register_groups() -> None:
     """Put all options into Hydra's store: under `schema/` for configs to begin with, and in their group without one."""
     store = ConfigStore.instance()
     for group, found in GROUPS.items():
         for name, part in found.parts.items():
-            if found.only(part):
+            if found.only(part) and _registered.get((group, name)) != (found, part):
+                _registered[group, name] = found, part
                 node = typed(name, part, found)
                 store.store(group=f"schema/{group}", name=option_name(name), node=node)
                 if not (CONFIGS / group / f"{option_name(name)}.yaml").is_file():

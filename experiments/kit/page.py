@@ -15,16 +15,18 @@ import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import jinja2
 import pandas as pd
 from markupsafe import Markup, escape
-from matplotlib import rc_context
-from matplotlib.figure import Figure
 
 from behaviours.storage import write_atomically
 from experiments.kit.columns import Column, Table
-from experiments.kit.figures import STYLE, png
+from experiments.kit.figures import drawn
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["Column", "Page", "Section", "Table"]
 
@@ -82,8 +84,7 @@ class Section:
         A figure that cannot be drawn costs nothing else: the page says why, and `page.failures` holds the traceback.
         """
         try:
-            with rc_context(STYLE):
-                content = png(draw())
+            content = drawn(draw)
         except Exception as error:  # whatever it is, the results are worth more than one picture
             self.page.failures[name] = traceback.format_exc()
             self.text(f"The figure `{name}` could not be drawn: {type(error).__name__}: {error}")

@@ -6,15 +6,17 @@ import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from experiments.kit.columns import Table
 from experiments.kit.page import Page
 from experiments.kit.settings import Settings
 from torchvsa.registry import Registry
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Cell = dict[str, Any]
 """One combination of the factors: names and plain values (numbers, text, None)."""

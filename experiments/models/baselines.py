@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.neighbors import KNeighborsClassifier
-from sklearn.neural_network import MLPClassifier
-from sklearn.tree import DecisionTreeClassifier
 
 import sim
 from behaviours import Demonstrations
 from experiments.models import draws
-from experiments.models.fitting import scaled
+from experiments.models.fitting import fit_seconds, scaled
+
+
+def _nearest_neighbour(seed: int) -> Any:
+    from sklearn.neighbors import KNeighborsClassifier
+
+    return KNeighborsClassifier(1)
+
+
+def _decision_tree(seed: int) -> Any:
+    from sklearn.tree import DecisionTreeClassifier
+
+    return DecisionTreeClassifier(random_state=seed)
+
+
+def _mlp(seed: int) -> Any:
+    from sklearn.neural_network import MLPClassifier
+
+    # Behaviour cloning. The looser tolerance ends it after 37 instead of 183 epochs of the corral's 60 demonstrations.
+    return scaled(MLPClassifier((64,), tol=1e-3, random_state=seed))
+
 
 CLASSIFIERS: dict[str, Callable[[int], Any]] = {
-    "nearest_neighbour": lambda seed: KNeighborsClassifier(1),
-    "decision_tree": lambda seed: DecisionTreeClassifier(random_state=seed),
-    # Behaviour cloning. The looser tolerance ends it after 37 instead of 183 epochs of the corral's 60 demonstrations.
-    "mlp": lambda seed: scaled(MLPClassifier((64,), tol=1e-3, random_state=seed)),
+    "nearest_neighbour": _nearest_neighbour,
+    "decision_tree": _decision_tree,
+    "mlp": _mlp,
 }
-"""scikit-learn's classifiers, made with a seed."""
+"""scikit-learn's classifiers, made with a seed. What makes one imports it, for that takes a second."""
 
 
 class Classified:
@@ -33,8 +47,8 @@ class Classified:
     def __init__(self, model: Any, train: Demonstrations) -> None:
         commands, labels = np.unique(train.commands.numpy(), axis=0, return_inverse=True)
         self.commands: NDArray[np.float64] = commands
-        with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
-            self.model = model.fit(train.sensors.numpy(), labels.ravel())
+        fit_seconds(model, train.sensors.numpy(), labels.ravel())
+        self.model = model
 
     def __call__(self, sensors: NDArray[np.float64]) -> NDArray[np.float64]:
         """Commands `[B, 2]` for readings `[B, 3]`."""

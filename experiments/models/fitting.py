@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import time
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
-from sklearn.exceptions import ConvergenceWarning
-from sklearn.pipeline import Pipeline, make_pipeline
-from sklearn.preprocessing import StandardScaler
+
+if TYPE_CHECKING:
+    from sklearn.pipeline import Pipeline
 
 
 def scaled(model: Any) -> Pipeline:
@@ -17,6 +17,9 @@ def scaled(model: Any) -> Pipeline:
 
     For models that compare or weigh features.
     """
+    from sklearn.pipeline import make_pipeline
+    from sklearn.preprocessing import StandardScaler
+
     return make_pipeline(StandardScaler(), model)
 
 
@@ -25,6 +28,8 @@ def fit_seconds(model: Any, x: NDArray[Any], y: NDArray[Any]) -> float:
 
     A model that stops before it has converged is evaluated as it is, without a warning.
     """
+    from sklearn.exceptions import ConvergenceWarning
+
     began = time.perf_counter()
     with warnings.catch_warnings(action="ignore", category=ConvergenceWarning):
         model.fit(x, y)

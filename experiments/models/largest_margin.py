@@ -2,7 +2,6 @@
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 KEPT = 0.9
 """The share of the largest margin that rounding to whole numbers has to keep."""
@@ -14,6 +13,8 @@ def largest_margin(leads: NDArray[np.float64]) -> NDArray[np.float64]:
     `leads` `[c, n]` holds, for each comparison, by how much each summand of weight 1 helps the wanted answer against
     the other one. Leads are linear in the weights, so this is a linear program.
     """
+    from scipy.optimize import linprog  # takes half a second to load
+
     comparisons, summands = leads.shape
     scaled = leads / (np.abs(leads).max() or 1.0)
     # The unknowns: the positive and the negative part of each weight, and the margin.

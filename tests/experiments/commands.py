@@ -8,7 +8,10 @@ from typing import Any
 
 from experiments.main import main
 
-SMALL = ("demonstrations=6", "starts=6", "other_starts=4", "wheeled_starts=2", "validation_starts=2", "seconds=20")
+SMALL = (
+    "demonstrations=6", "starts=6", "other_starts=4", "wheeled_starts=2", "validation_starts=2", "seconds=20",
+    "vsa.dim=1000",
+)  # fmt: skip
 """A job of seconds instead of minutes; what it shows is not meant to be good."""
 
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import pandas as pd
-from matplotlib.figure import Figure
 
 from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Settings, Study, Table, grid, part, setting
 from experiments.kit.figures import lines
@@ -41,7 +40,9 @@ def summarise(settings: Counting, records: pd.DataFrame) -> list[Row]:
     return [{"name": name, "mean": mean, "missing": None} for name, mean in means]
 
 
-def curve(outcome: Outcome) -> Figure:
+def curve(outcome: Outcome) -> Any:
+    from matplotlib.figure import Figure
+
     if not outcome.settings.drawable:
         raise RuntimeError("no ink")
     figure = Figure()

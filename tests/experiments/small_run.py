@@ -1,5 +1,7 @@
 """A tiny run of the main job, made in this process: everything that its page is drawn from."""
 
+import fcntl
+import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -61,8 +63,12 @@ def small_run(folder: Path, *overrides: str) -> Outcome:
 
 @cache
 def full_run() -> Outcome:
-    """All controllers."""
-    return small_run(Path(tempfile.mkdtemp()))
+    """All controllers. The first process of a test run that needs them runs the job, the others load what it found."""
+    of_tests = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
+    folder = Path(tempfile.gettempdir(), f"torchvsa-tests-{of_tests}")
+    with folder.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        return small_run(folder)
 
 
 @cache

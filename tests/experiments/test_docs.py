@@ -10,16 +10,16 @@ import pytest
 from kits import composed
 from packages import ROOT, install, python
 
+from experiments import studies
 from experiments.kit.run import config_of
 from experiments.kit.store import write_results
-from experiments.studies import STUDIES
 
 README = (ROOT / "README.md").read_text()
 COLLECT = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[-1]
 
 
 def test_a_sweep_of_the_main_job_is_collected(tmp_path: Path) -> None:
-    corral = STUDIES["corral"]
+    corral = studies.find("corral")
     assert corral.objective is not None
     for dim, success in ((1000, 0.25), (4000, 0.75)):
         settings = composed(corral, f"vsa.dim={dim}")
@@ -39,7 +39,7 @@ def test_the_settings_of_its_commands_are_settings() -> None:
     for name, overrides in commands:
         words = [word for word in overrides.split() if "=" in word and not word.startswith("hydra")]
         if name != "draw" and "--config-dir" not in overrides:
-            composed(STUDIES[name], *(word.split(",")[0] for word in words))
+            composed(studies.find(name), *(word.split(",")[0] for word in words))
 
 
 @pytest.mark.slow

@@ -31,7 +31,7 @@ TINY = (
     "baselines=[decision_tree]",
     "starts=4",
     "variant_starts=2",
-    "seconds=8",
+    "seconds=3",
     "workers=1",
 )
 DEFAULT = "level/none/product/error_driven"

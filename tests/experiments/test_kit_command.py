@@ -14,7 +14,7 @@ import pytest
 from commands import only, results
 from counting import study
 
-from experiments.kit.command import run_study
+from experiments.kit.command import ended_by_signals, run_study
 from experiments.main import main
 
 COUNTING = Path(__file__).with_name("counting.py")
@@ -132,7 +132,8 @@ def test_a_sweep_of_four_jobs_two_at_a_time_and_again(tmp_path: Path) -> None:
     lines = log.read_text().split()
     assert len(lines[::2]) == 8
     assert len(set(lines[1::2])) == 2  # processes
-    again = command(tmp_path, *arguments)
+    # What is there already does not depend on the launcher, and one process starts sooner.
+    again = command(tmp_path, *(argument for argument in arguments if "launcher" not in argument))
     _, said = again.communicate(timeout=300)
     assert again.returncode == 0, said
     assert log.read_text().split() == lines
@@ -144,12 +145,33 @@ def running(pid: int) -> bool:
     return False
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
+def test_a_signal_ends_a_command_as_an_exception_does(
+    number: signal.Signals, code: int, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before, cleaned = signal.getsignal(number), []
+
+    def job() -> None:
+        with ended_by_signals():
+            try:
+                os.kill(os.getpid(), number)
+                time.sleep(10)
+            finally:
+                cleaned.append(True)
+
+    with pytest.raises(SystemExit) as exit_:
+        job()
+    assert exit_.value.code == code
+    assert cleaned
+    assert f"{number.name}; the same command goes on from here" in capsys.readouterr().err
+    assert signal.getsignal(number) == before
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("number", "code", "words"),
     [
         (signal.SIGTERM, 143, "SIGTERM; the same command goes on from here"),
-        (signal.SIGHUP, 129, "SIGHUP; the same command goes on from here"),
         (signal.SIGKILL, -9, ""),
         (signal.SIGINT, 130, "counting: stopped; the same command goes on from here"),
     ],

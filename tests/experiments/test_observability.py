@@ -269,7 +269,7 @@ def test_the_memory_with_the_highest_validation_figure_is_the_one_of_the_rows(fi
 
 
 def test_the_same_seed_gives_the_same_results_in_other_batches(finished: Path, tmp_path: Path) -> None:
-    again = run(study, settings(*SMALL, "workers=1", "robots=1"), tmp_path, Console(file=io.StringIO()))
+    again = run(study, settings(*SMALL, "workers=1", "robots=3"), tmp_path, Console(file=io.StringIO()))
     before = results(finished)
     assert again.table == before["table"]
     assert again.metrics == before["metrics"]

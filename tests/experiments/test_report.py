@@ -12,7 +12,7 @@ from rich.console import Console
 from small_run import full_run, small_run
 
 from experiments.corral import tables
-from experiments.corral.page import headline
+from experiments.corral.study import headline
 from experiments.kit.run import draw, load
 
 

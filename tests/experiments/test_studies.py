@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 from kits import composed
+from packages import python
 
-import experiments.studies
+from experiments import studies
 from experiments.kit import STUDIES
 from experiments.kit.help import groups, markdown, markdown_of_group
 from experiments.kit.options import options
@@ -17,27 +18,40 @@ NAMES = ("capacity", "corral", "generalisation", "observability", "robustness", 
 
 
 def test_the_studies_are_all_there() -> None:
-    assert experiments.studies
+    studies.import_all()
     assert set(NAMES) <= set(STUDIES)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_preset_composes_and_is_allowed(name: str) -> None:
-    study = STUDIES[name]
+    study = studies.find(name)
     assert dataclasses.is_dataclass(study.settings)
     for preset in (None, *study.presets):
         check_all(study, composed(study, *([] if preset is None else [f"experiment={preset}"])))
 
 
+def test_the_command_of_a_study_imports_no_other_study() -> None:
+    """Also the libraries that others need would take seconds, in each process of a pool."""
+    code = """
+import sys
+from experiments import studies
+studies.find("corral")
+others = {"experiments.robustness", "experiments.generalisation"}
+assert not (others | {"matplotlib", "sklearn", "scipy"}) & set(sys.modules)
+"""
+    assert python(None, code).returncode == 0
+
+
 def test_the_page_of_all_settings_is_up_to_date() -> None:
-    assert (ROOT / "docs" / "settings.md").read_text() == experiments.studies.settings_page()
+    assert (ROOT / "docs" / "settings.md").read_text() == studies.settings_page()
 
 
 def test_readme_and_docs_name_every_study() -> None:
     readme = (ROOT / "README.md").read_text()
     for name in NAMES:
         assert f"torchvsa {name}" in readme
-        assert groups(STUDIES[name].settings) is not None
-        assert markdown(STUDIES[name]).startswith(f"## {name}\n")
+        study = studies.find(name)
+        assert groups(study.settings) is not None
+        assert markdown(study).startswith(f"## {name}\n")
     assert "`rule=error_driven`" in markdown_of_group("rule")
     assert "literal" in options("rule")

@@ -61,7 +61,7 @@ def test_a_decision_tree_reaches_the_figures_known_for_these_folds(tmp_path: Pat
 
 def test_one_hypervector_learns_the_real_robot() -> None:
     cell = {"model": "one_hypervector", "sensors": 2, "split": "stratified", "fold": 0}
-    record = measure(settings("dim=300"), cell)
+    record = measure(settings("dim=100"), cell)
     assert record["accuracy"] > 0.97
     assert record["rows"] == 1092
 

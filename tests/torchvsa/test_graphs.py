@@ -69,7 +69,9 @@ def encoders(vsa: VSA) -> list[Encoder]:
 
 @architectures
 def test_encoders_compile_whole(name: str, dtype: str | None) -> None:
-    for encode in encoders(architecture(name, 64, dtype)):
+    made = encoders(architecture(name, 64, dtype))
+    # In MAP-B and MAP-I all but their own bundling are the lines of MAP-C.
+    for encode in made[:3] if name in ("MAP-B", "MAP-I") else made:
         assert same_bits(compiled(encode)(READINGS), encode(READINGS))
         torch.compiler.reset()  # or one method would be compiled for too many classes
 
