@@ -1,12 +1,12 @@
 """`check_policy` passes on a sound policy, and names the law that a broken one breaks."""
 
 import copy
+from collections.abc import Sequence
 from typing import Any
 
 import pytest
 import torch
 from robots import space
-from torch import Tensor
 
 from behaviours import BehaviourBank, Demonstrations, OneShot, Policy, Priority
 from behaviours.recall import Recall
@@ -91,7 +91,7 @@ class Talking(Priority):
 class Unnamed(Priority):
     """Counts speakers from 1."""
 
-    def query(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Sequence[torch.Tensor]) -> Recall:
         recall = super().query(conditions)
         assert recall.speaker is not None
         return recall._replace(speaker=recall.speaker + 1)
@@ -104,7 +104,7 @@ class Live(Priority):
         super().__init__(bank)
         self.bank = bank
 
-    def query(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Sequence[torch.Tensor]) -> Recall:
         return Priority(self.bank).query(conditions)
 
 
@@ -115,14 +115,14 @@ class Loose(Priority):
         super().__init__(bank)
         self.others = [copy.deepcopy(Priority(bank))]
 
-    def query(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Sequence[torch.Tensor]) -> Recall:
         return self.others[0].query(conditions)
 
 
 class Dark(Priority):
     """Answers otherwise where gradients are off."""
 
-    def query(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Sequence[torch.Tensor]) -> Recall:
         recall = super().query(conditions)
         return recall if torch.is_grad_enabled() else recall._replace(similarity=recall.similarity * 0)
 
@@ -130,7 +130,7 @@ class Dark(Priority):
 class Endless(Priority):
     """Gives commands beyond the range."""
 
-    def query(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Sequence[torch.Tensor]) -> Recall:
         recall = super().query(conditions)
         return recall._replace(commands=recall.commands * 10)
 

@@ -1,7 +1,7 @@
 """An architecture, a continuous encoder, a learning rule, and a policy with a memory."""
 
 import math
-from collections.abc import Sized
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -148,7 +148,7 @@ class Hysteresis(Policy):
         speaker, waited = torch.where(takes_over, favourite, speaker), torch.where(takes_over, 0, waited)
         return _spoken(answers, speaker.clamp(min=0)).mask_unobserved(blind), (past, speaker, waited)
 
-    def query(self, conditions: Tensor) -> Recall:
+    def query(self, conditions: Sequence[Tensor]) -> Recall:
         """The answer at the start of an episode: the most familiar behaviour's."""
         answers = self.answers(conditions)
         return _spoken(answers, torch.stack([answer.familiarity for answer in answers]).argmax(0))
