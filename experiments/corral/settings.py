@@ -12,19 +12,13 @@ from experiments.tasks import corral
 
 
 @dataclass
-class Paper(corral.Printed):
-    """The printed algorithms, read literally."""
-
-    encoder: Part = part("encoder", "lookup", "the code of one reading; its bins are those of the run's encoder")
-    rule: Part = part("rule", "literal", "how a program is learned")
-
-
-@dataclass
 class Corral(corral.Learning):
     """The settings of this study."""
 
     composition: Part = part("composition", "bundle", "how the row bundled combines its three behaviours")
-    paper: Paper = settings(Paper, "the rows paper and paper_best_bins: the printed algorithms, read literally")
+    paper: corral.Paper = settings(
+        corral.Paper, "the rows paper and paper_best_bins: the printed algorithms, read literally"
+    )
     controllers: list[str] = setting(
         DEFAULT_ROWS, "the rows of the table, in this order", choices=lambda: CONTROLLERS, distinct=True
     )

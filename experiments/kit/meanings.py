@@ -24,6 +24,7 @@ MEANINGS = {
     "margin": "lead over the next result that counts as correct, in scores of one stored pair",
     "epochs": "passes over the samples at most",
     "average": "the mean of the program over all visits, instead of the last one",
+    "evidence": "how much louder a pair is the more often it was shown: this times log(1 + count)",
     "patience": "epochs without progress after which training ends",
     "ridge": "penalty on the program's length",
     "loss": "what gradient descent makes small",
@@ -36,5 +37,7 @@ MEANINGS = {
     # policies
     "weights": "weight of each behaviour by name; null for 1 each",
     "order": "names of the behaviours, the first that knows the condition speaks; null for the bank's order",
-    "thresholds": "familiarity from which a behaviour knows a condition, by name; null for chance",
+    "thresholds": "familiarity from which a behaviour knows a condition, by name; null: by its own conditions",
+    "beta": "how strongly the behaviour that knows the condition best prevails; 0 is the plain mean",
+    "familiarity": "weigh each behaviour by how well it knows the condition",
 }

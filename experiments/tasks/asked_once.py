@@ -1,20 +1,21 @@
-"""Drive with the answers of a behaviour or policy, each condition asked once."""
+"""Drive with the answers of behaviours or policies, each condition asked once."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 
-from behaviours import Behaviour, Policy, Recall
+from behaviours import Behaviour, Policy, Recall, Silence
 from behaviours.controller import Controller
 from behaviours.frozen import FrozenBehaviour
 
 MOST_CELLS = 2**22
-"""The most conditions whose answers can be looked up by number; 16 MiB."""
+"""The most conditions, of all controllers together, whose answers can be looked up by number; 16 MiB."""
 
 
 class AskedOnce:
@@ -28,15 +29,12 @@ class AskedOnce:
     """
 
     def __init__(self, controller: Controller) -> None:
-        self.controller = controller
-        self._sizes = _sizes(controller)
-        self._found = np.full(math.prod(self._sizes), -1, dtype=np.int32)
-        self._answers: Recall | None = None
+        self._each = EachAskedOnce([controller])
 
     @staticmethod
     def possible(controller: object) -> bool:
         """Whether a controller has no memory, and few enough conditions."""
-        if not isinstance(controller, Behaviour | FrozenBehaviour | Policy):
+        if not isinstance(controller, Behaviour | FrozenBehaviour | Policy | Silence):
             return False
         encoder, kind = controller.space.encoder, type(controller)
         plain = kind.start is Controller.start and kind.forward in (Controller.forward, FrozenBehaviour.forward)
@@ -45,17 +43,40 @@ class AskedOnce:
 
     def __call__(self, readings: NDArray[np.float64]) -> Recall:
         """The answer to readings `[B, n]`."""
-        cells = self.controller.space.cells(readings)
+        return self._each.step(readings, np.zeros(len(readings), dtype=np.int64))[0]
+
+
+class EachAskedOnce:
+    """Several controllers over equal sensors and bins; episode e is driven by controller e mod their number.
+
+    As with `AskedOnce`, each controller is asked once about each condition that any of its robots meets.
+    """
+
+    def __init__(self, controllers: Sequence[Controller]) -> None:
+        self.controllers = list(controllers)
+        self._sizes = (len(self.controllers), *_sizes(self.controllers[0]))
+        self._found = np.full(math.prod(self._sizes), -1, dtype=np.int32)
+        self._answers: Recall | None = None
+
+    def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The controller of each episode."""
+        return episodes % len(self.controllers)
+
+    def step(self, readings: NDArray[np.float64], which: NDArray[np.int64]) -> tuple[Recall, NDArray[np.int64]]:
+        """The answers to readings `[B, n]` of the controllers `which` `[B]`."""
+        cells = self.controllers[0].space.encoder.cells(self.controllers[0].space.schema.normalise(readings))
         # The last number of each sensor is for a reading that was not observed, whose cell is -1.
-        number = np.asarray(np.ravel_multi_index(tuple(cells.numpy().T), self._sizes, mode="wrap"))
-        row = self._found[number]
-        if (row < 0).any():
-            new, first = np.unique(number[row < 0], return_index=True)
-            asked = cells[torch.from_numpy(np.flatnonzero(row < 0)[first])]
-            self._found[new] = self._keep(self.controller.answer(asked))
-            row = self._found[number]
+        place = (which, *cells.numpy().T)
+        number = np.asarray(np.ravel_multi_index(place, self._sizes, mode="wrap"))
+        for index in np.unique(which[self._found[number] < 0]):
+            own = np.flatnonzero((which == index) & (self._found[number] < 0))
+            new, first = np.unique(number[own], return_index=True)
+            controller = self.controllers[index]
+            asked = cells[torch.from_numpy(own[first])]
+            space = controller.space
+            self._found[new] = self._keep(controller.answer(space.seen(asked)))
         assert self._answers is not None
-        return self._answers.rows(torch.from_numpy(row))
+        return self._answers.rows(torch.from_numpy(self._found[number])), which
 
     def _keep(self, answer: Recall) -> NDArray[np.int64]:
         """Keep these answers; returns their numbers."""

@@ -80,6 +80,14 @@ class Printed:
     rule: Part = part("rule", "one_shot", "how a program is learned")
 
 
+@dataclass
+class Paper(Printed):
+    """The printed algorithms, read literally."""
+
+    encoder: Part = part("encoder", "lookup", "the code of one reading; its bins are those of the run's encoder")
+    rule: Part = part("rule", "literal", "how a program is learned")
+
+
 def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
     """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
     return Schema(

@@ -1,0 +1,161 @@
+"""What is measured of a row: it drives in every arena, and is asked about the teacher's moments there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pandas as pd
+import torch
+from numpy.typing import NDArray
+from rich.progress import Progress
+
+import sim
+from behaviours import Demonstrations, Policy
+from behaviours.learning import no_convergence_warnings
+from experiments.composition.rows import ROWS, Line, Shown
+from experiments.kit import Cell, Row
+from experiments.kit.store import write_frame
+from experiments.tasks import agreement as agreeing
+from experiments.tasks import corral
+from experiments.tasks.asked_once import AskedOnce, EachAskedOnce
+
+if TYPE_CHECKING:
+    from experiments.composition.settings import Composition
+
+FULL = ("default", "large")
+"""The arenas with `starts` starts; others have `other_starts`."""
+PATHS_IN, PATHS = "large", 4
+"""The arena whose paths are kept for the page, and how many."""
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Distinct moments of the teacher's runs in one arena.
+
+    Attributes:
+        shown: a reading for each, and the teacher's commands.
+        count: how often each occurs.
+        cell: the index of its condition at the bins of the run.
+        avoid: whether the teacher avoids an obstacle.
+    """
+
+    shown: Demonstrations
+    count: NDArray[np.int64]
+    cell: NDArray[np.int64]
+    avoid: NDArray[np.bool_]
+
+    @property
+    def ceiling(self) -> float:
+        """The agreement of the best function of the bins."""
+        levels = torch.unique(corral.schema().command_levels(self.shown.commands), dim=0, return_inverse=True)[1]
+        votes = np.zeros((self.cell.max() + 1, int(levels.max()) + 1))
+        np.add.at(votes, (self.cell, levels.numpy()), self.count)
+        return float(votes.max(1).sum() / votes.sum())
+
+
+@dataclass(frozen=True)
+class Material:
+    """What all cells share: where files go, what is learned from, and the moments of each arena."""
+
+    folder: Path
+    shown: Shown
+    moments: dict[str, Moments]
+
+
+def prepare(settings: Composition, folder: Path, progress: Progress) -> Material:
+    """Let the teacher demonstrate in `default`, and drive held-out starts in every arena."""
+    first = corral.FIRST_DEMONSTRATION
+    episodes = range(first, first + settings.demonstrations)
+    train = corral.moving(corral.drive_together(settings, "teacher demonstrates", sim.Teacher(), episodes, progress))
+    shown = Shown(settings, train, corral.by_behaviour(train))
+    moments = {}
+    for name in settings.arenas:
+        what, asked = f"teacher in {name}", range(settings.heldout)
+        driven = corral.drive_together(settings, what, sim.Teacher(), asked, progress, sim.find_arena(name))
+        moments[name] = distinct(shown, corral.moving(driven))
+    return Material(folder, shown, moments)
+
+
+def distinct(shown: Shown, samples: Demonstrations) -> Moments:
+    """The moments of recorded runs that differ at the bins of the run, or in what the teacher does."""
+    cells = shown.space(0).cells(samples.sensors)
+    levels = corral.schema().command_levels(samples.commands)
+    fires = np.isin(sim.Teacher().rule(samples.sensors.numpy()), sim.BEHAVIOURS["avoid"])
+    key = torch.cat([cells, levels, torch.from_numpy(fires)[:, None]], 1).numpy()
+    _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
+    chosen = torch.from_numpy(first)
+    cell = torch.unique(cells[chosen], dim=0, return_inverse=True)[1].numpy()
+    rows = Demonstrations(samples.sensors[chosen], samples.commands[chosen], np.arange(len(chosen)))
+    return Moments(rows, count, cell, fires[first])
+
+
+def measure(material: Material, cell: Cell) -> list[Row]:
+    """A record for each arena and codebook: success, agreement with the teacher, collisions."""
+    settings, line = material.shown.settings, ROWS[cell["row"]]
+    draws = range(settings.codebooks if line.codebooks else 1)
+    with no_convergence_warnings():
+        made = [line.make(material.shown, codebook) for codebook in draws]
+    together = len(made) > 1 or AskedOnce.possible(made[0])
+    driver = EachAskedOnce(made) if together else made[0]
+    driving = settings if cell["engine"] == "vector" else replace(settings, engine="bullet", robots=None)
+    found = []
+    for name in settings.arenas:
+        keep = name == PATHS_IN and cell["engine"] == "vector"
+        run = corral.drive(driving, driver, range(starts(settings, cell, name)), sim.find_arena(name), record=keep)
+        if keep:
+            write_paths(material.folder, cell["row"], made, run)
+        for codebook in draws:
+            own = run.episode % len(draws) == codebook
+            found.append(
+                {
+                    "arena": name,
+                    "codebook": codebook,
+                    "episodes": int(own.sum()),
+                    "successes": int(run.success[own].sum()),
+                    "collisions": float(run.collisions[own].mean()) if own.any() else None,
+                    **(agreement(made[codebook], line, material.moments[name]) if cell["engine"] == "vector" else {}),
+                }
+            )
+    return found
+
+
+def starts(settings: Composition, cell: Cell, arena: str) -> int:
+    """How many held-out starts a cell drives in an arena."""
+    if cell["engine"] == "bullet":
+        return settings.bullet_starts
+    return settings.starts if arena in FULL else settings.other_starts
+
+
+def agreement(controller: Any, line: Line, moments: Moments) -> Row:
+    """The share of the teacher's moments with the teacher's commands: of all, of those in which it avoids, and by cell.
+
+    `agreement_distinct` counts each condition once; `ceiling` is the best that a function of the bins could reach.
+    """
+    right = agreeing.right(controller, moments.shown)
+    by_cell = np.bincount(moments.cell, right * moments.count) / np.bincount(moments.cell, moments.count)
+    avoid = moments.avoid
+    return {
+        "agreement": float(np.average(right, weights=moments.count)),
+        "agreement_avoid": float(np.average(right[avoid], weights=moments.count[avoid])) if avoid.any() else None,
+        "agreement_distinct": float(by_cell.mean()),
+        "ceiling": moments.ceiling,
+    }
+
+
+def write_paths(folder: Path, row: str, made: list[Any], run: sim.Rollout) -> None:
+    """Keep the first paths, with who spoke at each step and how well the condition was known."""
+    paths = []
+    for episode in range(min(PATHS, len(run))):
+        steps, controller = run.slice(episode), made[episode % len(made)]
+        path = pd.DataFrame({"episode": episode, "x": steps.x, "y": steps.y, "success": bool(run.success[episode])})
+        if isinstance(controller, Policy):
+            recall = controller(steps.sensors)
+            assert recall.speaker is not None
+            path["speaker"] = np.array([*controller.names, ""])[recall.speaker.numpy()]
+            path["familiarity"] = recall.familiarity.numpy()
+        paths.append(path)
+    (folder / "paths").mkdir(exist_ok=True)
+    write_frame(folder / "paths" / f"{row}.parquet", pd.concat(paths))

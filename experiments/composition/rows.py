@@ -1,0 +1,188 @@
+"""The rows of the study: policies that combine three behaviours learned apart, and references."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import sim
+from behaviours import (
+    Behaviour,
+    BehaviourBank,
+    Blending,
+    Bundle,
+    Controller,
+    Demonstrations,
+    ErrorDriven,
+    Gated,
+    MotorSchema,
+    Priority,
+    Space,
+    Vote,
+    WinnerTakesAll,
+)
+from experiments.kit import parts
+from experiments.models.baselines import CLASSIFIERS, Classified
+from experiments.models.behaviour_tree import BehaviourTree
+from experiments.tasks import corral
+from experiments.tasks.asked_once import EachAskedOnce
+
+if TYPE_CHECKING:
+    from experiments.composition.settings import Composition
+
+MASKS = {"seek_light": ["light_left", "light_right"], "avoid": ["distance"]}
+"""The sensors that each behaviour uses in the rows `masked_*`: prior knowledge. `cruise` uses all."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the rows learn from.
+
+    Attributes:
+        settings: of the run.
+        train: moments of the teacher's runs in the arena `default`.
+        apart: the same, by the behaviour whose rules fired.
+    """
+
+    settings: Composition
+    train: Demonstrations
+    apart: dict[str, Demonstrations] = field(default_factory=dict)
+
+    def space(self, codebook: int, record: str | None = None) -> Space:
+        """One draw of the codebooks, with the run's record or another."""
+        settings = self.settings
+        chosen = settings.record if record is None else {"name": record}
+        return parts.space(
+            corral.schema(), settings.vsa, settings.encoder, chosen, settings.protection, settings.seed + codebook
+        )
+
+    def bank(
+        self, codebook: int, record: str | None = None, masks: dict[str, list[str]] | None = None
+    ) -> BehaviourBank:
+        """The three behaviours learned apart; none knows of the others."""
+        bank, rule = BehaviourBank(self.space(codebook, record)), parts.rule(self.settings.rule)
+        for name, samples in self.apart.items():
+            bank.learn(name, samples, rule, sensors=(masks or {}).get(name))
+        return bank
+
+
+@dataclass(frozen=True)
+class Line:
+    """One row of the table.
+
+    Attributes:
+        make: `make(shown, codebook)` returns what drives.
+        about: what it is, in a few words.
+        codebooks: whether it is made anew for each draw of the codebooks.
+    """
+
+    make: Callable[[Shown, int], Any]
+    about: str
+    codebooks: bool = True
+
+
+def together(shown: Shown, codebook: int, record: str | None = None) -> Behaviour:
+    """One program learned from all demonstrations."""
+    return parts.rule(shown.settings.rule).fit(shown.space(codebook, record), shown.train)
+
+
+def plain_sum(shown: Shown, codebook: int, record: str | None = None) -> Bundle:
+    """The sum of programs that know nothing of each other."""
+    return Bundle(shown.bank(codebook, record))
+
+
+def evident_sum(shown: Shown, codebook: int) -> Bundle:
+    """The sum of programs learned apart with silence, evidence and precedence."""
+    settings, bank = shown.settings, BehaviourBank(shown.space(codebook))
+    rule: Any = parts.rule(settings.rule)
+    assert isinstance(rule, ErrorDriven)
+    rules = dict.fromkeys(shown.apart, replace(rule, evidence=settings.evidence))
+    bank.learn_apart(shown.apart, rules | {"avoid": replace(rules["avoid"], margin=settings.precedence)})
+    return Bundle(bank)
+
+
+def paper_sum(shown: Shown, codebook: int) -> Behaviour:
+    """The printed algorithms: each program clipped at every step, and so is their sum."""
+    printed = shown.settings.paper
+    encoder = {**printed.encoder, "bins": shown.settings.encoder.get("bins", 32)}
+    space = parts.space(
+        corral.schema(), shown.settings.vsa, encoder, printed.record, printed.protection,
+        shown.settings.seed + codebook,
+    )  # fmt: skip
+    rule = parts.rule(printed.rule)
+    return Behaviour.sum([rule.fit(space, samples) for samples in shown.apart.values()]).clipped()
+
+
+class Oracle:
+    """Asks the program of the behaviour that the teacher's rules would choose."""
+
+    def __init__(self, banks: list[BehaviourBank]) -> None:
+        self.names = banks[0].names
+        self.parts = [EachAskedOnce([bank[name] for bank in banks]) for name in self.names]
+
+    def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The codebook of each episode."""
+        return self.parts[0].start(episodes)
+
+    def step(
+        self, readings: NDArray[np.float64], which: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Commands `[B, 2]`."""
+        fires = sim.Teacher().rule(readings)
+        commands = np.zeros((len(readings), len(sim.ACTUATORS)))
+        for name, part in zip(self.names, self.parts, strict=True):
+            rows = np.isin(fires, sim.BEHAVIOURS[name])
+            if rows.any():
+                commands[rows] = part.step(readings[rows], which[rows])[0].commands.numpy()
+        return commands, which
+
+
+def policy(
+    made: Callable[[BehaviourBank], Controller], masks: dict[str, list[str]] | None = None
+) -> Callable[[Shown, int], Controller]:
+    """A policy over the three behaviours learned apart."""
+    return lambda shown, codebook: made(shown.bank(codebook, masks=masks))
+
+
+ROWS: dict[str, Line] = {
+    "teacher": Line(lambda shown, codebook: sim.Teacher(), "the rules that were shown", codebooks=False),
+    "nearest_neighbour": Line(
+        lambda shown, codebook: Classified(CLASSIFIERS["nearest_neighbour"](shown.settings.seed), shown.train),
+        "all demonstrations kept",
+        codebooks=False,
+    ),
+    "oracle": Line(
+        lambda shown, codebook: Oracle([shown.bank(each) for each in range(shown.settings.codebooks)]),
+        "separate programs; the teacher's rules say which one is asked",
+        codebooks=False,
+    ),
+    "joint_program": Line(together, "one program learned from all demonstrations"),
+    "evident_sum": Line(evident_sum, "a plain sum of programs learned apart with silence, evidence and precedence"),
+    "masked_priority": Line(
+        policy(Priority, MASKS), "each behaviour sees its own sensors; the first that knows speaks"
+    ),
+    "masked_winner": Line(policy(WinnerTakesAll, MASKS), "the same; the one that knows best speaks"),
+    "masked_sum": Line(policy(lambda bank: MotorSchema(bank, familiarity=False), MASKS), "the same; scores are added"),
+    "behaviour_tree": Line(policy(BehaviourTree, MASKS), "the same behaviours as leaves of a py_trees selector"),
+    "plain_sum": Line(plain_sum, "the sum of programs that know nothing of each other"),
+    "priority": Line(policy(Priority), "the first that knows the condition speaks"),
+    "winner_takes_all": Line(policy(WinnerTakesAll), "the one that knows the condition best speaks"),
+    "gated": Line(policy(Gated), "one vector, asked with the context of the one that knows best"),
+    "motor_schema": Line(policy(MotorSchema), "scores weighted by familiarity"),
+    "blending": Line(policy(Blending), "commands weighted by familiarity"),
+    "vote": Line(policy(Vote), "the majority of commands"),
+    "paper_sum": Line(paper_sum, "the printed algorithms: programs and sum clipped"),
+    "joint_sum_record": Line(lambda *given: together(*given, record="sum"), "joint_program with sensors bundled"),
+    "plain_sum_record": Line(lambda *given: plain_sum(*given, record="sum"), "plain_sum with sensors bundled"),
+    "joint_subset_record": Line(
+        lambda *given: together(*given, record="subset_product"), "joint_program with a subset of sensors per element"
+    ),
+    "plain_subset_record": Line(
+        lambda *given: plain_sum(*given, record="subset_product"), "plain_sum with a subset of sensors per element"
+    ),
+}
+"""All rows by name."""

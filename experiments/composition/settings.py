@@ -1,0 +1,62 @@
+"""What the study of combination can be told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sim
+from experiments.composition.rows import ROWS
+from experiments.kit import Part, part, parts, setting, settings
+from experiments.tasks import corral
+
+ARENAS = ["default", "narrow", "large", "offset_lamp", "clutter", "two_gaps"]
+
+
+@dataclass
+class Composition(corral.Learning):
+    """The settings of this study."""
+
+    encoder: Part = part("encoder", "level_wide", "the code of one reading")
+    paper: corral.Paper = settings(corral.Paper, "the row paper_sum: the printed algorithms, read literally")
+    rows: list[str] = setting(list(ROWS), "the rows of the table, in this order", choices=lambda: ROWS, distinct=True)
+    bullet_rows: list[str] = setting(
+        ["teacher", "joint_program", "evident_sum", "masked_priority"],
+        "rows that drive in the physics engine, too", choices=lambda: ROWS, distinct=True, empty=True,
+    )  # fmt: skip
+    arenas: list[str] = setting(ARENAS, "where they drive; all learn in `default`", choices=sim.ARENAS, distinct=True)
+    starts: int = setting(1000, "held-out starts in default and large, over all codebooks", low=1)
+    other_starts: int = setting(500, "held-out starts in every other arena", low=1)
+    bullet_starts: int = setting(200, "held-out starts in the physics engine", low=1)
+    heldout: int = setting(200, "episodes of the teacher in each arena about which programs are asked", low=1)
+    codebooks: int = setting(10, "draws of the codebooks; start e drives with codebook e mod this number", low=1)
+    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    evidence: float = setting(1.0, "evident_sum: how much louder a pair is the more often it was shown", low=0)
+    precedence: float = setting(8.0, "evident_sum: the margin of avoid; the others have that of the rule", low=0)
+
+
+def check(settings: Composition) -> None:
+    """Raise for settings with which something could not be learned or driven."""
+    space = corral.space(settings)
+    parts.refuse_unsupported(parts.rule(settings.rule), space)
+    for name in settings.arenas:
+        if name not in corral.arenas():
+            known = ", ".join(corral.arenas())
+            raise ValueError(f"arenas: in {name} there is more than one light; choose from {known}")
+    if "evident_sum" in settings.rows and settings.rule["name"] != "error_driven":
+        raise ValueError(f"rule={settings.rule['name']}: the row evident_sum needs rule=error_driven")
+    for name in settings.bullet_rows:
+        if name not in settings.rows:
+            raise ValueError(f"bullet_rows: {name} is not among the rows")
+
+
+PRESETS = {
+    "quick": {
+        "rows": ["teacher", "joint_program", "plain_sum", "evident_sum", "masked_priority"],
+        "bullet_rows": [],
+        "arenas": ["default", "large"],
+        "starts": 40,
+        "heldout": 10,
+        "codebooks": 2,
+        "demonstrations": 20,
+    },
+}

@@ -1,0 +1,61 @@
+"""A behaviour tree whose leaves are hypervector behaviours, with the library `py_trees`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Shaped
+from py_trees import behaviour
+from py_trees.common import Status
+from py_trees.composites import Selector
+from py_trees.composites import Sequence as InTurn
+from py_trees.trees import BehaviourTree as Tree
+from torch import Tensor
+
+from behaviours import BehaviourBank, Policy, Recall
+
+
+class _Leaf(behaviour.Behaviour):
+    """Succeeds if its behaviour knows the condition, or always; remembers that it was reached."""
+
+    def __init__(self, name: str, number: int, always: bool) -> None:
+        super().__init__(name)
+        self.number, self.always = number, always
+        self.known: Sequence[bool] = ()
+
+    def update(self) -> Status:
+        return Status.SUCCESS if self.always or self.known[self.number] else Status.FAILURE
+
+
+class BehaviourTree(Policy):
+    """A selector over one sequence for each behaviour: *it knows the condition*, then *let it speak*.
+
+    The last one speaks without being asked whether it knows. A condition is known from a familiarity of
+    `Behaviour.threshold` on.
+
+    Source: Colledanchise and Ögren 2018, "Behavior trees in robotics and AI"; py_trees 2.6.
+    """
+
+    def __init__(self, bank: BehaviourBank) -> None:
+        super().__init__(bank, bank.names)
+        last = len(self.names) - 1
+        self._leaves = [_Leaf(name, number, number == last) for number, name in enumerate(self.names)]
+        branches = [InTurn(f"let {leaf.name}", memory=False, children=[leaf]) for leaf in self._leaves]
+        self._tree = Tree(Selector("who", memory=False, children=branches))
+
+    def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
+        """See `Policy.query`."""
+        answers = self.answers(conditions)
+        limits = [0.0 if part.threshold is None else part.threshold for part in self.parts]
+        familiar = torch.stack([recall.familiarity for recall in answers], 1)
+        patterns, index = (familiar >= torch.tensor(limits)).unique(dim=0, return_inverse=True)
+        speakers = torch.tensor([self._tick(pattern) for pattern in patterns.tolist()])
+        return self.spoken(answers, speakers[index])
+
+    def _tick(self, known: Sequence[bool]) -> int:
+        """Which behaviour the tree lets speak, given who knows the condition."""
+        for leaf in self._leaves:
+            leaf.known = known
+        self._tree.tick()
+        return next(leaf.number for leaf in self._leaves if leaf.status is Status.SUCCESS)
