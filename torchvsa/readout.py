@@ -76,18 +76,13 @@ class Readout(nn.Module):
         scores = over_lengths(self._products(conditions).to(torch.float64), self.lengths)
         return scores if self.units is None else scores * self.units.to(torch.float64)
 
-    def cosines(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
-        """The cosine of each unbound, noisy result with each item; 0 for zero vectors."""
-        scores = over_lengths(self._products(conditions).to(torch.float64), self.lengths)
-        return over_lengths(scores, self._noise(conditions)[..., None])
-
     def match(self, conditions: Shaped[Tensor, "batch d"]) -> Match:
         """The best item for each condition, `[B]` or `[B, b]`, with its cosine and margin (see `CleanUp`)."""
         if self.vsa.bilinear and is_integer(conditions):
             # Products and lengths both take float64; convert once.
             conditions = as_bipolar(conditions).to(torch.float64)
         products = self._products(conditions)
-        return best(over_lengths(products.to(torch.float64), self.lengths), self._noise(conditions))
+        return best(over_lengths(products.to(torch.float64), self.lengths), self.noise(conditions))
 
     def _products(self, conditions: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch *b K"]:
         self.vsa.check(conditions, "conditions")
@@ -97,7 +92,7 @@ class Readout(nn.Module):
         row_bytes = self.programs.numel() * max(self.programs.element_size(), 4)
         return by_blocks(lambda rows: inner_products(self._unbound(rows), self.items), conditions, row_bytes=row_bytes)
 
-    def _noise(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b"]:
+    def noise(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b"]:
         """The length of each noisy result, `|unbind(program, condition)|`."""
         if self.programs.dim() == 1:
             return self.vsa.unbound_norm(self.programs, conditions)

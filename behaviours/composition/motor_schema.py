@@ -12,7 +12,6 @@ from behaviours.composition.base import Policy
 from behaviours.memory import ResultMemory
 from behaviours.options import as_bool
 from behaviours.recall import Recall
-from torchvsa._numerics import norms
 from torchvsa.memory import best
 
 
@@ -21,8 +20,8 @@ class MotorSchema(Policy):
 
     aᵢ is the familiarity of behaviour i with its condition cᵢ, so that one who does not know it is hardly heard. Unlike
     in a `Bundle`, behaviours may use different sensors. The speaker is the behaviour that contributes most to the score
-    of the recalled result; `similarity` is the mean of the behaviours' cosines with it, weighted by what each adds;
-    `familiarity` is the speaker's.
+    of the recalled result; `similarity` is the mean of the behaviours' cosines with it, weighted by the length of what
+    each adds; `familiarity` is the speaker's.
 
     Args:
         bank: The behaviours to combine.
@@ -52,19 +51,16 @@ class MotorSchema(Policy):
         """See `Policy.query`."""
         items = self.memory.current_items()
         answers = self.answers(conditions)
-        cosines = torch.stack(
-            [
-                self.space.vsa.readout(part.program, items).cosines(condition)
-                for part, condition in zip(self.parts, conditions, strict=True)
-            ],
-            1,
-        )
-        loudness = self._weights * torch.stack([norms(part.program) for part in self.parts]).flatten()
+        readouts = [self.space.vsa.readout(part.program, items) for part in self.parts]
+        pairs = list(zip(readouts, conditions, strict=True))
+        scores = torch.stack([readout(condition) for readout, condition in pairs], 1)
+        lengths = torch.stack([readout.noise(condition) for readout, condition in pairs], 1)
+        loudness = self._weights.expand(len(scores), -1)
         if self.familiarity:
             loudness = loudness * torch.stack([recall.familiarity.double() for recall in answers], -1)
-        loudness = loudness.expand(len(cosines), -1)
-        shares = loudness[..., None] * cosines
-        match = best(shares.sum(1), loudness.abs().sum(-1))
+        shares = loudness[..., None] * scores
+        # No sum of noisy results is longer than their lengths together.
+        match = best(shares.sum(1), (loudness.abs() * lengths).sum(-1))
         winner = match.index[:, None, None].expand(-1, shares.shape[1], 1)
         spoken = self.spoken(answers, shares.gather(-1, winner)[..., 0].argmax(-1))
         return spoken._replace(

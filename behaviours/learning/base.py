@@ -59,7 +59,8 @@ class Rule(ABC):
             space: As in `fit`.
             demonstrations: As in `fit`.
             silent: What the others were shown. Only its readings are used, never its commands: where they are not among
-                the demonstrated conditions, every result is to score about 0.
+                the demonstrated conditions, every result is to score about 0, also those that only others have (as long
+                as there are at most 64 combinations of levels).
             progress: As in `fit`.
 
         Raises:

@@ -100,7 +100,7 @@ class ErrorDriven(Rule):
     def _learn(self, space: Space, samples: Samples, before: Behaviour | None, progress: Progress) -> Behaviour:
         targets = samples.targets(self.contradictions)
         margins = self.margin + self.evidence * samples.evidence()
-        pairs = Pairs(space.vsa, samples, targets, space.items(samples.results), margins)
+        pairs = Pairs(space.vsa, samples, targets, samples.items(space), margins)
         start = torch.zeros(space.vsa.dim, dtype=space.vsa.accumulator, device=targets.device)
         if before is not None:
             start = start + as_bipolar(before.program).detach()

@@ -79,7 +79,9 @@ class LeastSquares(Rule):
         if samples.silent is not None:
             fitted = torch.cat([conditions, samples.silent[:]])
             targets = functional.pad(targets, (0, 0, 0, len(samples.silent)))
-        program = solve(space.vsa, fitted, items, targets, self.ridge, subrange(progress, 0.2, 0.9))
+        every = samples.items(space)
+        targets = functional.pad(targets, (0, len(every) - len(items)))
+        program = solve(space.vsa, fitted, every, targets, self.ridge, subrange(progress, 0.2, 0.9))
         predicted = space.vsa.readout(program, items)(conditions).argmax(1)
         report = samples.report(
             self.name,

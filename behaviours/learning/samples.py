@@ -1,5 +1,6 @@
 """Demonstrations as index arrays into their distinct conditions and results."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -41,6 +42,8 @@ class Samples:
     """The index of each sample's result."""
     silent: Shaped[Tensor, "q d"] | LazyConditions | None = None
     """Further conditions, on which a behaviour is to be silent."""
+    rivals: Int64[Tensor, "s m"] | None = None
+    """Further results, which others may have: they are not to win, but are not stored."""
 
     @classmethod
     def of(
@@ -63,8 +66,10 @@ class Samples:
         levels = space.schema.command_levels(demonstrations.commands).to(cells.device)
         conditions, condition = encode_distinct(space, cells, progress)
         distinct_results, result = distinct_rows(levels)
-        others = None if silent is None else _others(space, cells, silent)
-        return cls(conditions, distinct_results, condition, result, others)
+        if silent is None:
+            return cls(conditions, distinct_results, condition, result)
+        others = _others(space, cells, silent)
+        return cls(conditions, distinct_results, condition, result, others, _rivals(space, distinct_results))
 
     def with_known_results(self, results: Int64[Tensor, "p m"]) -> "Samples":
         """The same samples, with indices into `results` (stored before) followed by the new results."""
@@ -84,6 +89,10 @@ class Samples:
         pick = "amin" if contradictions == "first" else "amax"
         chosen = torch.zeros(conditions, dtype=torch.int64, device=rows.device)
         return self.result[chosen.scatter_reduce(0, self.condition, rows, pick, include_self=False)]
+
+    def items(self, space: Space) -> Shaped[Tensor, "r+s d"]:
+        """The hypervectors of all results, those of rivals last."""
+        return space.items(self.results if self.rivals is None else torch.cat([self.results, self.rivals]))
 
     def evidence(self) -> Float64[Tensor, "k"]:
         """log(1 + n) for each condition, which was shown n times."""
@@ -123,6 +132,18 @@ def _others(
     new[index[: len(cells)]] = False
     return encode_distinct(space, distinct[new])[0] if new.any() else None
 
+
+def _rivals(space: Space, results: Int64[Tensor, "r m"]) -> Int64[Tensor, "s m"]:
+    """All other combinations of levels; none if there are very many."""
+    levels = [torch.arange(actuator.levels, device=results.device) for actuator in space.schema.actuators]
+    if math.prod(map(len, levels)) > _MOST_RIVALS:
+        return results[:0]
+    every = torch.cartesian_prod(*levels).reshape(-1, len(levels))
+    return distinct_rows(torch.cat([results, every]))[0][len(results) :]
+
+
+_MOST_RIVALS = 64
+"""With more combinations of commands, only the results that were shown are trained on."""
 
 _ROWS = 256
 """Conditions superposed in one call; bounds the memory."""
