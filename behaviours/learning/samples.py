@@ -1,6 +1,5 @@
 """Demonstrations as index arrays into their distinct conditions and results."""
 
-import math
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
@@ -69,7 +68,7 @@ class Samples:
         if silent is None:
             return cls(conditions, distinct_results, condition, result)
         others = _others(space, cells, silent)
-        return cls(conditions, distinct_results, condition, result, others, _rivals(space, distinct_results))
+        return cls(conditions, distinct_results, condition, result, others, _rivals(space, distinct_results, silent))
 
     def with_known_results(self, results: Int64[Tensor, "p m"]) -> "Samples":
         """The same samples, with indices into `results` (stored before) followed by the new results."""
@@ -133,17 +132,11 @@ def _others(
     return encode_distinct(space, distinct[new])[0] if new.any() else None
 
 
-def _rivals(space: Space, results: Int64[Tensor, "r m"]) -> Int64[Tensor, "s m"]:
-    """All other combinations of levels; none if there are very many."""
-    levels = [torch.arange(actuator.levels, device=results.device) for actuator in space.schema.actuators]
-    if math.prod(map(len, levels)) > _MOST_RIVALS:
-        return results[:0]
-    every = torch.cartesian_prod(*levels).reshape(-1, len(levels))
-    return distinct_rows(torch.cat([results, every]))[0][len(results) :]
+def _rivals(space: Space, results: Int64[Tensor, "r m"], silent: Demonstrations) -> Int64[Tensor, "s m"]:
+    """The results that only others have; which condition has which is not used."""
+    theirs = space.schema.command_levels(silent.commands).to(results.device)
+    return distinct_rows(torch.cat([results, theirs]))[0][len(results) :]
 
-
-_MOST_RIVALS = 64
-"""With more combinations of commands, only the results that were shown are trained on."""
 
 _ROWS = 256
 """Conditions superposed in one call; bounds the memory."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from behaviours import (
     Bundle,
     Controller,
     Demonstrations,
-    ErrorDriven,
     Gated,
     MotorSchema,
     Priority,
@@ -96,12 +95,9 @@ def plain_sum(shown: Shown, codebook: int, record: str | None = None) -> Bundle:
 
 
 def evident_sum(shown: Shown, codebook: int) -> Bundle:
-    """The sum of programs learned apart with silence, evidence and precedence."""
-    settings, bank = shown.settings, BehaviourBank(shown.space(codebook))
-    rule: Any = parts.rule(settings.rule)
-    assert isinstance(rule, ErrorDriven)
-    rules = dict.fromkeys(shown.apart, replace(rule, evidence=settings.evidence))
-    bank.learn_apart(shown.apart, rules | {"avoid": replace(rules["avoid"], margin=settings.precedence)})
+    """The sum of programs learned apart, each silent where only others know, and louder the more it has seen."""
+    bank = BehaviourBank(shown.space(codebook))
+    bank.learn_apart(shown.apart, parts.rule(shown.settings.evident))
     return Bundle(bank)
 
 
@@ -161,7 +157,7 @@ ROWS: dict[str, Line] = {
         codebooks=False,
     ),
     "joint_program": Line(together, "one program learned from all demonstrations"),
-    "evident_sum": Line(evident_sum, "a plain sum of programs learned apart with silence, evidence and precedence"),
+    "evident_sum": Line(evident_sum, "a plain sum of programs learned apart, silent where only others know"),
     "masked_priority": Line(
         policy(Priority, MASKS), "each behaviour sees its own sensors; the first that knows speaks"
     ),

@@ -30,8 +30,7 @@ class Composition(corral.Learning):
     heldout: int = setting(200, "episodes of the teacher in each arena about which programs are asked", low=1)
     codebooks: int = setting(10, "draws of the codebooks; start e drives with codebook e mod this number", low=1)
     demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
-    evidence: float = setting(1.0, "evident_sum: how much louder a pair is the more often it was shown", low=0)
-    precedence: float = setting(8.0, "evident_sum: the margin of avoid; the others have that of the rule", low=0)
+    evident: Part = part("rule", "evident", "how evident_sum learns: silent where only others know, louder by evidence")
 
 
 def check(settings: Composition) -> None:
@@ -42,8 +41,10 @@ def check(settings: Composition) -> None:
         if name not in corral.arenas():
             known = ", ".join(corral.arenas())
             raise ValueError(f"arenas: in {name} there is more than one light; choose from {known}")
-    if "evident_sum" in settings.rows and settings.rule["name"] != "error_driven":
-        raise ValueError(f"rule={settings.rule['name']}: the row evident_sum needs rule=error_driven")
+    evident = parts.rule(settings.evident)
+    parts.refuse_unsupported(evident, space)
+    if not evident.supports_silence:
+        raise ValueError(f"evident={evident.name} cannot keep silence; choose error_driven, least_squares or evident")
     for name in settings.bullet_rows:
         if name not in settings.rows:
             raise ValueError(f"bullet_rows: {name} is not among the rows")
