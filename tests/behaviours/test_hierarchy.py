@@ -87,7 +87,8 @@ def test_the_seed_draws_contexts_tag_and_names_unrelated_to_the_codebooks() -> N
     assert not torch.equal(first.contexts, other.contexts)
     assert not torch.equal(first.tag, other.tag)
     drawn = torch.cat([first.contexts, first.tag[None], first.name_items])
-    codes = torch.cat([behaviours.space.encoder.state_dict()["values.0.codes"], drawn])
+    codebooks = behaviours.space.encoder.state_dict()
+    codes = torch.cat([codebooks["roles"], codebooks["values.0.codes"], drawn])
     alike = behaviours.space.vsa.similarity(drawn[:, None], codes).abs()
     alike[:, -len(drawn) :].fill_diagonal_(0)
     assert alike.max() < 6 / 4000**0.5
