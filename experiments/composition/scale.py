@@ -249,6 +249,16 @@ def misses(rows: Sequence[dict[str, float]], most: int = DISTINCT) -> dict[str, 
     }
 
 
+def table(rows: Sequence[dict[str, float]]) -> str:
+    """The rows of `capacity` or `contradictions` as a Markdown table."""
+    names = list(rows[0])
+    lines = [names, ["---"] * len(names)]
+    lines += [
+        [f"{row[name]:.3f}" if "." in name or name == "votes" else f"{row[name]:.0f}" for name in names] for row in rows
+    ]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
 def _mean(rows: Sequence[dict[str, float]]) -> dict[str, float]:
     """The mean of each column over codebooks; queries are added."""
     mean = {name: sum(row[name] for row in rows) / len(rows) for name in rows[0]}

@@ -141,3 +141,13 @@ def compare(
     )
     rows = {"teacher": teacher, "one vector": learned, "one vector, where the teacher succeeds": learned[teacher]}
     return {name: corral.success(len(found), int(found.sum())) for name, found in rows.items()}
+
+
+def table(rows: dict[str, dict[str, Any]]) -> str:
+    """The rows of `compare` as a Markdown table."""
+    lines = [
+        f"| {name} | {row['success_rate']:.3f} [{row['success_low']:.3f}, {row['success_high']:.3f}] "
+        f"| {row['episodes']} |"
+        for name, row in rows.items()
+    ]
+    return "\n".join(["| row | success | starts |", "|---|---|---|", *lines])

@@ -36,6 +36,10 @@ def test_recall_is_what_is_predicted() -> None:
     assert rows[0]["trained.predicted"] == rows[0]["trained.bundled"] == 1
     assert rows[-1]["one_shot.bundled"] < 0.4
     assert max(scale.misses(rows).values()) < 0.06
+    head, _, first, *rest = scale.table(rows).splitlines()
+    assert head.startswith("| dim | behaviours | queries | one_shot.bundled |")
+    assert first.startswith("| 500 | 1 | 2560 | 1.000 | 1.000 |")
+    assert len(rest) == 3
 
 
 def test_votes_are_counted() -> None:
@@ -61,5 +65,6 @@ def test_a_robot_goes_to_the_lamp_that_was_never_demonstrated() -> None:
         "one vector": 1.0,
         "one vector, where the teacher succeeds": 1.0,
     }
+    assert "| one vector | 1.000 [0.610, 1.000] | 6 |" in sequence.table(rows)
     assert sequence.agreement(room, 0, sequence.runs(room, 5), tested=10) > 0.95
     assert sim.Task.of(room) == sequence.TASK
