@@ -5,9 +5,12 @@ from collections.abc import Callable
 from behaviours.composition.base import Policy
 from behaviours.composition.blending import Blending
 from behaviours.composition.bundle import Bundle
+from behaviours.composition.choosing import choosing
 from behaviours.composition.gated import Gated
+from behaviours.composition.hierarchy import Hierarchy
 from behaviours.composition.motor_schema import MotorSchema
 from behaviours.composition.priority import Priority
+from behaviours.composition.sequencing import Sequencing
 from behaviours.composition.silence import Silence
 from behaviours.composition.vote import Vote
 from behaviours.composition.winner_takes_all import WinnerTakesAll
@@ -23,6 +26,8 @@ POLICIES: Registry[Callable[..., Policy]] = Registry(
         "motor_schema": MotorSchema,
         "vote": Vote,
         "gated": Gated,
+        "hierarchy": Hierarchy,
+        "sequencing": Sequencing,
     },
 )
 """Policies by name; each is called with a bank and its options."""
@@ -32,10 +37,13 @@ __all__ = [
     "Blending",
     "Bundle",
     "Gated",
+    "Hierarchy",
     "MotorSchema",
     "Policy",
     "Priority",
+    "Sequencing",
     "Silence",
     "Vote",
     "WinnerTakesAll",
+    "choosing",
 ]

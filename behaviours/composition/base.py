@@ -13,6 +13,7 @@ from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
 from behaviours.options import as_float
 from behaviours.recall import Recall
+from torchvsa import VSA
 from torchvsa._blocks import by_blocks
 
 
@@ -34,6 +35,11 @@ class Policy(Controller):
         self.space = bank.space
         self.names = names
         self._parts = nn.ModuleList([bank[name] for name in names])
+
+    @classmethod
+    def supports(cls, vsa: VSA) -> bool:
+        """Whether it can be made of behaviours of this architecture, with its default options."""
+        return True
 
     @property
     def parts(self) -> list[Behaviour]:

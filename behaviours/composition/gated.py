@@ -9,8 +9,8 @@ from torch import Tensor
 from behaviours.algebra import merged_results, weighted_sum
 from behaviours.bank import BehaviourBank
 from behaviours.composition.base import Policy
+from behaviours.composition.choosing import seed_of
 from behaviours.memory import ResultMemory
-from behaviours.options import as_int
 from behaviours.recall import Recall, familiarity
 
 
@@ -34,7 +34,7 @@ class Gated(Policy):
     def __init__(self, bank: BehaviourBank, seed: int = 0) -> None:
         super().__init__(bank, bank.names)
         vsa, device = self.space.vsa, self.space.device
-        generator = torch.Generator().manual_seed(as_int("seed", seed, 0))
+        generator = torch.Generator().manual_seed(seed_of(seed, 0))
         self.register_buffer("contexts", vsa.random(len(self.names), generator=generator, device=device))
         self.register_buffer("program", self._joined())
         results = merged_results([term for part in self.parts for term in part.terms]).to(device)

@@ -64,7 +64,7 @@ GROUPS: dict[str, Group] = {
     ),
     "protection": Group(PROTECTIONS, frozenset({"vsa", "h"})),
     "rule": Group(RULES),
-    "composition": Group(POLICIES, frozenset({"bank"})),
+    "composition": Group(POLICIES, frozenset({"bank", "chooser", "transitions", "rule"})),
 }
 """The groups of all studies. A task adds its own."""
 
