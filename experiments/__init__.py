@@ -17,6 +17,7 @@ _NEEDED = (
     "scipy",
     "pybullet",
     "gymnasium",
+    "py_trees",
 )
 
 if _missing := next((name for name in _NEEDED if find_spec(name) is None), None):

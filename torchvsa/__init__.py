@@ -9,7 +9,7 @@ from torchvsa.part import Part
 from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected, protection
 from torchvsa.readout import Readout
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 __all__ = [
     "ARCHITECTURES",

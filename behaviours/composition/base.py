@@ -109,3 +109,12 @@ class Policy(Controller):
             as_float(f"{what} of {name!r}", given.get(name, default))
             for name, default in zip(self.names, otherwise, strict=True)
         ]
+
+
+def threshold_of(part: Behaviour) -> float:
+    """The familiarity from which a behaviour knows a condition: its `threshold`, or half of 1/√k for k pairs."""
+    # Rounding must not make the least familiar condition unknown.
+    return 0.5 / max(part.report.pairs, 1) ** 0.5 if part.threshold is None else part.threshold - _ROUNDING
+
+
+_ROUNDING = 1e-6

@@ -7,8 +7,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from behaviours.bank import BehaviourBank
-from behaviours.behaviour import Behaviour
-from behaviours.composition.base import Policy
+from behaviours.composition.base import Policy, threshold_of
 from behaviours.recall import Recall
 
 
@@ -38,7 +37,7 @@ class Priority(Policy):
         if isinstance(order, str):
             raise TypeError(f"order is a list of names, the highest priority first; write [{order!r}] for {order!r}")
         super().__init__(bank, bank.names if order is None else list(order))
-        defaults = [_threshold(part) for part in self.parts]
+        defaults = [threshold_of(part) for part in self.parts]
         self.thresholds = self.per_behaviour(thresholds, defaults, "thresholds")
         # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.
         column = torch.tensor(self.thresholds, device=self.space.device)[:, None]
@@ -51,11 +50,3 @@ class Priority(Policy):
         known = above >= 0
         speaker = torch.where(known.any(0), known.to(torch.int8).argmax(0), above.argmax(0))
         return self.spoken(answers, speaker)
-
-
-def _threshold(part: Behaviour) -> float:
-    # Rounding must not make the least familiar condition unknown.
-    return 0.5 / max(part.report.pairs, 1) ** 0.5 if part.threshold is None else part.threshold - _ROUNDING
-
-
-_ROUNDING = 1e-6

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from behaviours.algebra import weighted_sum
 from behaviours.bank import BehaviourBank
+from behaviours.composition.base import threshold_of
 from behaviours.composition.choosing import naming_space, numbered, seed_of, with_length
 from behaviours.composition.gated import Gated
 from behaviours.demonstrations import Demonstrations
@@ -90,10 +91,7 @@ class Sequencing(Gated):
         if bound:
             chain = weighted_sum(vsa, [1] * len(bound), bound)
             self.program = weighted_sum(vsa, [1, 1], [self.program, vsa.bind(chain, self.tag)])
-        thresholds = [
-            0.5 / max(part.report.pairs, 1) ** 0.5 if part.threshold is None else part.threshold - _ROUNDING
-            for part in self.parts
-        ]
+        thresholds = [threshold_of(part) for part in self.parts]
         self.register_buffer("_thresholds", torch.tensor(thresholds, device=device), persistent=False)
 
     def start(self, episodes: Sized) -> Any:
@@ -145,8 +143,8 @@ class Sequencing(Gated):
             return torch.full((len(condition),), number, device=condition.device)
         vsa = self.space.vsa
         program = vsa.unbind(vsa.unbind(self.program, self.tag), self.contexts[number])
-        cosines = vsa.readout(program, self.name_items).cosines(condition)
-        likeness, name = cosines.masked_fill(~self.follows[number], -torch.inf).max(-1)
+        scores = vsa.readout(program, self.name_items)(condition)
+        likeness, name = scores.masked_fill(~self.follows[number], -torch.inf).max(-1)
         # A condition without observed sensors is similar to nothing.
         return torch.where(likeness > 0, name, number)
 
@@ -182,4 +180,3 @@ def _demonstrations(readings: Any) -> Demonstrations:
 
 
 _EXAMPLE = "{('seek', 'dock'): readings}"
-_ROUNDING = 1e-6

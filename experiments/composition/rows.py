@@ -18,6 +18,7 @@ from behaviours import (
     Controller,
     Demonstrations,
     Gated,
+    Hierarchy,
     MotorSchema,
     Priority,
     Space,
@@ -59,13 +60,16 @@ class Shown:
             corral.schema(), settings.vsa, settings.encoder, chosen, settings.protection, settings.seed + codebook
         )
 
-    def bank(
-        self, codebook: int, record: str | None = None, masks: dict[str, list[str]] | None = None
-    ) -> BehaviourBank:
+    def bank(self, codebook: int, record: str | None = None) -> BehaviourBank:
         """The three behaviours learned apart; none knows of the others."""
-        bank, rule = BehaviourBank(self.space(codebook, record)), parts.rule(self.settings.rule)
-        for name, samples in self.apart.items():
-            bank.learn(name, samples, rule, sensors=(masks or {}).get(name))
+        bank = BehaviourBank(self.space(codebook, record))
+        bank.learn_apart(self.apart, parts.rule(self.settings.rule), silence=False)
+        return bank
+
+    def evident_bank(self, codebook: int, masks: dict[str, list[str]] | None = None) -> BehaviourBank:
+        """The same, each silent where only others know, and louder the more it has seen."""
+        bank = BehaviourBank(self.space(codebook))
+        bank.learn_apart(self.apart, parts.rule(self.settings.evident), sensors=masks)
         return bank
 
 
@@ -96,9 +100,13 @@ def plain_sum(shown: Shown, codebook: int, record: str | None = None) -> Bundle:
 
 def evident_sum(shown: Shown, codebook: int) -> Bundle:
     """The sum of programs learned apart, each silent where only others know, and louder the more it has seen."""
-    bank = BehaviourBank(shown.space(codebook))
-    bank.learn_apart(shown.apart, parts.rule(shown.settings.evident))
-    return Bundle(bank)
+    return Bundle(shown.evident_bank(codebook))
+
+
+def masked_sum(shown: Shown, codebook: int) -> MotorSchema:
+    """The scores of behaviours that see their own sensors only, with precedence for the light."""
+    loud = {"seek_light": shown.settings.precedence}
+    return MotorSchema(shown.evident_bank(codebook, MASKS), loud, familiarity=False)
 
 
 def paper_sum(shown: Shown, codebook: int) -> Behaviour:
@@ -137,11 +145,14 @@ class Oracle:
         return commands, which
 
 
-def policy(
-    made: Callable[[BehaviourBank], Controller], masks: dict[str, list[str]] | None = None
-) -> Callable[[Shown, int], Controller]:
-    """A policy over the three behaviours learned apart."""
-    return lambda shown, codebook: made(shown.bank(codebook, masks=masks))
+def plain(made: Callable[[BehaviourBank], Controller]) -> Callable[[Shown, int], Controller]:
+    """A policy over behaviours that know nothing of each other."""
+    return lambda shown, codebook: made(shown.bank(codebook))
+
+
+def masked(made: Callable[[BehaviourBank], Controller]) -> Callable[[Shown, int], Controller]:
+    """A policy over behaviours that see their own sensors only, and are silent where only others know."""
+    return lambda shown, codebook: made(shown.evident_bank(codebook, MASKS))
 
 
 ROWS: dict[str, Line] = {
@@ -158,19 +169,18 @@ ROWS: dict[str, Line] = {
     ),
     "joint_program": Line(together, "one program learned from all demonstrations"),
     "evident_sum": Line(evident_sum, "a plain sum of programs learned apart, silent where only others know"),
-    "masked_priority": Line(
-        policy(Priority, MASKS), "each behaviour sees its own sensors; the first that knows speaks"
-    ),
-    "masked_winner": Line(policy(WinnerTakesAll, MASKS), "the same; the one that knows best speaks"),
-    "masked_sum": Line(policy(lambda bank: MotorSchema(bank, familiarity=False), MASKS), "the same; scores are added"),
-    "behaviour_tree": Line(policy(BehaviourTree, MASKS), "the same behaviours as leaves of a py_trees selector"),
+    "masked_priority": Line(masked(Priority), "each behaviour sees its own sensors; the first that knows speaks"),
+    "masked_winner": Line(masked(WinnerTakesAll), "the same; the one that knows best speaks"),
+    "masked_sum": Line(masked_sum, "the same; scores are added, those of seek louder"),
+    "behaviour_tree": Line(masked(BehaviourTree), "the same behaviours as leaves of a py_trees selector"),
     "plain_sum": Line(plain_sum, "the sum of programs that know nothing of each other"),
-    "priority": Line(policy(Priority), "the first that knows the condition speaks"),
-    "winner_takes_all": Line(policy(WinnerTakesAll), "the one that knows the condition best speaks"),
-    "gated": Line(policy(Gated), "one vector, asked with the context of the one that knows best"),
-    "motor_schema": Line(policy(MotorSchema), "scores weighted by familiarity"),
-    "blending": Line(policy(Blending), "commands weighted by familiarity"),
-    "vote": Line(policy(Vote), "the majority of commands"),
+    "priority": Line(plain(Priority), "the first that knows the condition speaks"),
+    "winner_takes_all": Line(plain(WinnerTakesAll), "the one that knows the condition best speaks"),
+    "gated": Line(plain(Gated), "one vector, asked with the context of the one that knows best"),
+    "hierarchy": Line(plain(Hierarchy), "one vector that also recalls whom to ask"),
+    "motor_schema": Line(plain(MotorSchema), "scores weighted by familiarity"),
+    "blending": Line(plain(Blending), "commands weighted by familiarity"),
+    "vote": Line(plain(Vote), "the majority of commands"),
     "paper_sum": Line(paper_sum, "the printed algorithms: programs and sum clipped"),
     "joint_sum_record": Line(lambda *given: together(*given, record="sum"), "joint_program with sensors bundled"),
     "plain_sum_record": Line(lambda *given: plain_sum(*given, record="sum"), "plain_sum with sensors bundled"),

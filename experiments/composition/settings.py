@@ -20,7 +20,7 @@ class Composition(corral.Learning):
     paper: corral.Paper = settings(corral.Paper, "the row paper_sum: the printed algorithms, read literally")
     rows: list[str] = setting(list(ROWS), "the rows of the table, in this order", choices=lambda: ROWS, distinct=True)
     bullet_rows: list[str] = setting(
-        ["teacher", "joint_program", "evident_sum", "masked_priority"],
+        ["teacher", "joint_program", "evident_sum", "masked_priority", "masked_sum"],
         "rows that drive in the physics engine, too", choices=lambda: ROWS, distinct=True, empty=True,
     )  # fmt: skip
     arenas: list[str] = setting(ARENAS, "where they drive; all learn in `default`", choices=sim.ARENAS, distinct=True)
@@ -29,6 +29,7 @@ class Composition(corral.Learning):
     bullet_starts: int = setting(200, "held-out starts in the physics engine", low=1)
     heldout: int = setting(200, "episodes of the teacher in each arena about which programs are asked", low=1)
     codebooks: int = setting(10, "draws of the codebooks; start e drives with codebook e mod this number", low=1)
+    precedence: float = setting(2.4, "masked_sum: how much louder seek_light is than the others", above=0)
     demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
     evident: Part = part("rule", "evident", "how evident_sum learns: silent where only others know, louder by evidence")
 

@@ -74,8 +74,8 @@ def headline(outcome: Outcome) -> str:
             "A plain sum of programs learned apart agrees with the teacher as one program learned jointly does, "
             f"within {gap:.3f} in every arena"
         )
-    if "large" in arenas and "masked_priority" in outcome.settings.rows:
-        rate = found["masked_priority", "large"]["success_rate"]
+    if "large" in arenas and "masked_sum" in outcome.settings.rows:
+        rate = found["masked_sum", "large"]["success_rate"]
         words.append(f"behaviours that see only their own sensors succeed from {rate:.1%} of the starts in large")
     return "; ".join(words) + "." if words else ""
 
@@ -119,7 +119,7 @@ of the teacher in the same arena, before it reaches the lamp.
 Where the teacher fails (clutter, two_gaps), success does not rank policies: judge those arenas by agreement.
 
 Masks (`masked_*`, `behaviour_tree`) are prior knowledge that the other rows do not have: seek sees the lights, avoid
-the distance.
+the distance. These behaviours learn as those of `evident_sum` do.
 """
 
 study = Study(

@@ -1,0 +1,124 @@
+"""The study of combination, small."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import torch
+from kits import composed
+from rich.console import Console
+
+import sim
+from behaviours import BehaviourBank, Demonstrations, OneShot, Priority
+from experiments.composition import study
+from experiments.composition.measure import distinct
+from experiments.composition.rows import MASKS, ROWS, Shown
+from experiments.kit.run import check_all, run
+from experiments.models.behaviour_tree import BehaviourTree
+from experiments.tasks import corral
+from experiments.tasks.asked_once import EachAskedOnce
+
+SMALL = ("vsa.dim=512", "demonstrations=6", "heldout=3", "codebooks=2", "seconds=25")
+
+
+def shown() -> Shown:
+    driven = sim.rollout(sim.Teacher(), episodes=range(1_000_000, 1_000_006), seconds=25, record=True)
+    train = corral.moving(driven)
+    return Shown(composed(study, *SMALL), train, corral.by_behaviour(train))
+
+
+def test_rows_drive_in_each_arena_with_several_codebooks(tmp_path: Path) -> None:
+    settings = composed(
+        study, *SMALL, "rows=[teacher,joint_program,evident_sum,masked_sum,plain_sum,gated]", "bullet_rows=[teacher]",
+        "arenas=[default,large]", "starts=6", "bullet_starts=2", "workers=1",
+    )  # fmt: skip
+    outcome = run(study, settings, tmp_path, Console(quiet=True))
+    assert len(outcome.table) == 7 * 2
+    rows = {(row["row"], row["arena"]): row for row in outcome.table}
+    assert rows["teacher", "default"]["agreement"] == 1.0
+    assert rows["teacher_bullet", "large"]["starts"] == 2
+    found = outcome.records.loc[(outcome.records.row == "evident_sum") & (outcome.records.arena == "default")]
+    assert found.episodes.tolist() == [3, 3]
+    assert outcome.metrics["evident_sum.default.agreement"] == pytest.approx(found.agreement.mean())
+    assert outcome.metrics["evident_sum.default.success_rate"] == found.successes.sum() / 6
+    assert outcome.metrics["joint_program.large.agreement_avoid"] is not None
+    assert rows["evident_sum", "default"]["agreement"] > 0.9
+    assert rows["evident_sum", "default"]["ceiling"] >= rows["joint_program", "default"]["agreement"]
+    for name in ("success", "agreement", "paths", "familiarity"):
+        assert (tmp_path / "figures" / f"{name}.png").is_file()
+    path = pd.read_parquet(tmp_path / "paths" / "gated.parquet")
+    assert set(path.speaker) <= {"seek_light", "avoid", "cruise"}
+    assert "within" in outcome_headline(outcome)
+
+
+def outcome_headline(outcome: object) -> str:
+    return study.headline(outcome)  # pyright: ignore[reportArgumentType]
+
+
+def test_what_cannot_work_is_refused() -> None:
+    for overrides, message in (
+        (("rule@evident=one_shot",), "cannot keep silence"),
+        (("arenas=[two_lamps]",), "more than one light"),
+        (("rows=[teacher]", "bullet_rows=[vote]"), "vote is not among the rows"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            check_all(study, composed(study, *overrides))
+
+
+def test_every_row_can_be_made() -> None:
+    what = shown()
+    readings = what.train.sensors[:20].numpy()
+    for name, line in ROWS.items():
+        made = line.make(what, 0)
+        commands = np.asarray(sim.replay(made, readings, np.arange(20)))
+        assert commands.shape == (20, 2), name
+        assert np.isfinite(commands).all(), name
+
+
+def test_the_ceiling_is_what_the_best_function_of_the_bins_reaches() -> None:
+    what = shown()
+    moments = distinct(what, what.train)
+    assert moments.count.sum() == len(what.train)
+    cells = what.space(0).cells(what.train.sensors).numpy()
+    commands = what.train.commands.numpy()
+    best = 0
+    for cell in np.unique(cells, axis=0):
+        here = commands[(cells == cell).all(1)]
+        best += np.unique(here, axis=0, return_counts=True)[1].max()
+    assert moments.ceiling == pytest.approx(best / len(what.train))
+
+
+def test_each_start_drives_with_its_own_codebook() -> None:
+    what = shown()
+    banks = [what.bank(codebook) for codebook in range(2)]
+    each = EachAskedOnce([bank["seek_light"] for bank in banks])
+    readings = what.train.sensors[:10].numpy()
+    which = each.start(np.arange(10))
+    assert which.tolist() == [0, 1] * 5
+    commands = each.step(readings, which)[0].commands
+    for codebook, bank in enumerate(banks):
+        own = bank["seek_light"](readings[codebook::2]).commands
+        assert torch.equal(commands[codebook::2], own)
+
+
+def test_a_behaviour_tree_is_a_priority() -> None:
+    what = shown()
+    bank = what.evident_bank(0, MASKS)
+    readings = what.train.sensors[::7]
+    tree, priority = BehaviourTree(bank)(readings), Priority(bank)(readings)
+    limits = [part.threshold or 0 for part in Priority(bank).parts]
+    familiar = np.stack([bank[name](readings).familiarity.numpy() for name in bank], 1)
+    clear = (np.abs(familiar - limits) > 1e-5).all(1) & (familiar >= limits).any(1)
+    assert tree.speaker is not None
+    assert priority.speaker is not None
+    assert tree.speaker.numpy()[clear].tolist() == priority.speaker.numpy()[clear].tolist()
+
+
+def test_a_tree_lets_the_last_one_speak_where_nobody_knows() -> None:
+    bank = BehaviourBank(shown().space(0))
+    for name, row in (("a", [0.1, 0.1, 0.1]), ("b", [3.0, 3.0, 0.9])):
+        bank.learn(name, Demonstrations([row], [[1.0, 1.0]]), OneShot())
+    for part in (bank["a"], bank["b"]):
+        part.threshold = 0.99
+    assert BehaviourTree(bank)([[0.1, 0.1, 0.1], [2.0, 0.4, 0.5]]).speaker.tolist() == [0, 1]  # pyright: ignore[reportOptionalMemberAccess]
