@@ -33,7 +33,7 @@ MEANINGS = {
     "sparse": "train the roots of two squares whose difference is the program, which favours few large elements",
     "validation_fraction": "share of the samples held back to choose the epoch",
     "output": "type of the finished program's elements",
-    "seed": "seed of the order of samples",
+    "seed": "seed of the order of samples, or of the contexts",
     # policies
     "weights": "weight of each behaviour by name; null for 1 each",
     "order": "names of the behaviours, the first that knows the condition speaks; null for the bank's order",

@@ -60,7 +60,8 @@ GROUPS: dict[str, Group] = {
     "record": Group(
         ENCODERS,
         frozenset({"vsa", "values", "sensors", "edges", "kinds", "bins"}),
-        only=lambda part: takes(part, "values", "vsa"),
+        # What mirrors needs to be told which sensors swap.
+        only=lambda part: takes(part, "values", "vsa") and not takes(part, "pairs"),
     ),
     "protection": Group(PROTECTIONS, frozenset({"vsa", "h"})),
     "rule": Group(RULES),

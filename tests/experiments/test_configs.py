@@ -52,7 +52,7 @@ def test_every_option_composes_and_builds(option: str) -> None:
 
 
 def test_the_default_table_has_the_promised_rows() -> None:
-    assert settings().controllers == [name for name in CONTROLLERS if name != "ppo"]
+    assert settings().controllers == [name for name in CONTROLLERS if name not in ("ppo", "default_wheeled")]
 
 
 def test_the_paper_preset_is_literal() -> None:

@@ -37,7 +37,7 @@ def test_what_is_not_allowed_is_named(override: str, words: str) -> None:
 def test_defaults_are_those_of_the_classes_and_presets_change_them() -> None:
     assert composed(study).rule == {
         "name": "error_driven", "margin": 5.0, "epochs": 200, "contradictions": "majority", "average": False,
-        "patience": 30,
+        "patience": 30, "evidence": 0.0,
     }  # fmt: skip
     assert composed(study, "experiment=quick").repeats == 1
     printed = composed(study, "experiment=printed", "rule.sigmas=3")
