@@ -26,7 +26,8 @@ class Silence(Controller):
         fallback: Commands for silent rows, one per actuator; by default NaN, which a simulator refuses.
 
     Raises:
-        ValueError: For thresholds that are not numbers, and a fallback that is not one valid command per actuator.
+        ValueError: For a controller with a state, for thresholds that are not numbers, and for a fallback that is not
+            one valid command per actuator.
     """
 
     _fallback: Tensor
@@ -39,6 +40,8 @@ class Silence(Controller):
         fallback: Sequence[float] | None = None,
     ) -> None:
         super().__init__()
+        if type(controller).start is not Controller.start:
+            raise ValueError(f"{type(controller).__name__} has a memory, which Silence would lose; wrap its behaviours")
         self.controller, self.space = controller, controller.space
         self.familiarity = as_float("familiarity", familiarity)
         self.similarity = as_float("similarity", similarity)

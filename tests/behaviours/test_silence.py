@@ -8,7 +8,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain import wide
-from robots import SCHEMA, random_pairs, space
+from robots import random_pairs, space
 
 from behaviours import (
     BehaviourBank,
@@ -19,6 +19,7 @@ from behaviours import (
     LeastSquares,
     OneShot,
     Rule,
+    Sequencing,
     Silence,
 )
 
@@ -117,4 +118,5 @@ def test_silence_is_an_answer() -> None:
     assert Silence(bank["known"], similarity=0.99)(known).speaker.tolist() == [-1] * 8
     with pytest.raises(ValueError, match="left_motor"):
         Silence(bank["known"], fallback=[9, 0])
-    assert [actuator.name for actuator in SCHEMA.actuators] == ["left_motor", "right_motor"]
+    with pytest.raises(ValueError, match="Sequencing has a memory"):
+        Silence(Sequencing(bank))
