@@ -78,7 +78,7 @@ class Policy(Controller):
 
     def spoken(self, answers: Sequence[Recall], speaker: Int64[Tensor, "batch"]) -> Recall:
         """The answer of one behaviour for each row: that of `speaker`."""
-        rows = torch.arange(len(speaker), device=speaker.device)
+        rows = torch.arange(speaker.shape[0], device=speaker.device)
 
         def of_speaker(field: str) -> Tensor:
             return torch.stack([getattr(recall, field) for recall in answers])[speaker, rows]

@@ -55,7 +55,7 @@ class MotorSchema(Policy):
         pairs = list(zip(readouts, conditions, strict=True))
         scores = torch.stack([readout(condition) for readout, condition in pairs], 1)
         lengths = torch.stack([readout.noise(condition) for readout, condition in pairs], 1)
-        loudness = self._weights.expand(len(scores), -1)
+        loudness = self._weights.expand(scores.shape[0], -1)
         if self.familiarity:
             loudness = loudness * torch.stack([recall.familiarity.double() for recall in answers], -1)
         shares = loudness[..., None] * scores

@@ -63,7 +63,7 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("repeats=1,2", "a list needs brackets, repeats=[1,2]; a job for each needs --multirun"),
         ("repaets=1", "there is no setting 'repaets'; did you mean repeats?"),
         ("zzz=1", "there is no setting 'zzz'; choose from seed, workers, fresh, rule"),
-        ("rule=nonsense", "there is no rule 'nonsense'; choose from error_driven, gradient, "),
+        ("rule=nonsense", "there is no rule 'nonsense'; choose from error_driven, evident, gradient, "),
         ("rule.epoch=3", "there is no setting 'rule.epoch'; did you mean rule.epochs?"),
         ("experiment=nonsense", "there is no experiment 'nonsense'; choose from printed, quick"),
         ("+experiment=quick", "experiment"),

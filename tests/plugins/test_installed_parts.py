@@ -123,4 +123,4 @@ def test_the_example_of_the_documentation_works(tmp_path: Path) -> None:
     install(tmp_path, project["name"], {"loudest": module}, project["entry-points"]["torchvsa.plugins"])
     ran = python(tmp_path, f"{user}\n{check}", "-W", "error")
     assert ran.returncode == 0, ran.stderr
-    assert ran.stdout == "<class 'loudest.Loudest'> ['bundle', 'priority', 'loudest']\n"
+    assert ran.stdout == f"<class 'loudest.Loudest'> {[*POLICIES, 'loudest']}\n"
