@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from packages import ROOT, install, python
 
+from behaviours import POLICIES
+
 USER = """
 import torch
 from behaviours import POLICIES, RULES, Actuator, BehaviourBank, Demonstrations, Schema, Sensor, Space
