@@ -18,7 +18,7 @@ from behaviours.options import as_float
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
-from behaviours.space import Space
+from behaviours.space import Space, conditions_of
 from behaviours.storage import Layout, check_layout, error_context, load_tensors, save_tensors
 from torchvsa._blocks import by_blocks
 
@@ -184,7 +184,7 @@ class BehaviourBank(nn.Module):
 
     def _query_all(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
         behaviours = [self[name] for name in self]
-        conditions = conditions_of(behaviours, self.space, cells)
+        conditions = conditions_of([part.space for part in behaviours], cells)
         answers = [part.query(condition) for part, condition in zip(behaviours, conditions, strict=True)]
         return Recall(*(torch.stack([getattr(answer, f) for answer in answers], 1) for f in Recall._fields[:4]))
 
@@ -271,23 +271,6 @@ class BehaviourBank(nn.Module):
                     behaviour.threshold = thresholds[number]
                 bank.add(name, behaviour)
         return bank
-
-
-def conditions_of(
-    behaviours: Sequence[Behaviour], space: Space, cells: Shaped[Tensor, "batch w"]
-) -> list[Shaped[Tensor, "batch d"]]:
-    """The encoded and protected condition for each behaviour, made of the sensors that it uses.
-
-    Behaviours that use the same sensors share one tensor. One none of whose sensors was observed has a condition of
-    zeros, which is similar to nothing.
-    """
-    encoded: dict[tuple[str, ...], Tensor] = {}
-    for sensors, seen in {part.space.sensors: part.space.seen(cells) for part in behaviours}.items():
-        condition = space.encode(seen)
-        # Rows in which no sensor at all was observed are masked in the answer.
-        everything = len(sensors) == len(space.schema.sensors)
-        encoded[sensors] = condition if everything else condition.masked_fill((seen < 0).all(-1, keepdim=True), 0)
-    return [encoded[part.space.sensors] for part in behaviours]
 
 
 _PARTS = ("program", "known", "results")

@@ -205,6 +205,22 @@ class Space(nn.Module):
         return space
 
 
+def conditions_of(spaces: Sequence[Space], cells: Shaped[Tensor, "batch w"]) -> list[Shaped[Tensor, "batch d"]]:
+    """The protected condition of each row of cells in each of these spaces, which differ in the sensors that are used.
+
+    Spaces that use the same sensors share one tensor. Where none of its sensors was observed, a condition is zero and
+    similar to nothing.
+    """
+    encoded: dict[tuple[str, ...], Tensor] = {}
+    for space in {space.sensors: space for space in spaces}.values():
+        seen = space.seen(cells)
+        condition = space.encode(seen)
+        # Rows in which no sensor at all was observed are masked in the answer.
+        everything = len(space.sensors) == len(space.schema.sensors)
+        encoded[space.sensors] = condition if everything else condition.masked_fill((seen < 0).all(-1, keepdim=True), 0)
+    return [encoded[space.sensors] for space in spaces]
+
+
 def _layout(parts: Mapping[str, Part]) -> Layout:
     return {f"{name}.{key}": spec for name, part in parts.items() for key, spec in part.layout().items()}
 

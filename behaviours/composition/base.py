@@ -8,11 +8,12 @@ import torch
 from jaxtyping import Float64, Int64, Shaped
 from torch import Tensor, nn
 
-from behaviours.bank import BehaviourBank, conditions_of
+from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
 from behaviours.options import as_float
 from behaviours.recall import Recall
+from behaviours.space import conditions_of
 from torchvsa import VSA
 from torchvsa._blocks import by_blocks
 
@@ -56,7 +57,7 @@ class Policy(Controller):
         Those that use the same sensors share one tensor. A behaviour none of whose sensors was observed has a condition
         of zeros, which is similar to nothing.
         """
-        return conditions_of(self.parts, self.space, cells)
+        return conditions_of([part.space for part in self.parts], cells)
 
     @abstractmethod
     def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
