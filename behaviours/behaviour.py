@@ -23,12 +23,13 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
 from behaviours.ordered import distinct_rows
-from behaviours.recall import Recall, answer_cells, answer_conditions
+from behaviours.recall import Recall, answer_cells, answer_conditions, familiarity
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Sensor
-from behaviours.space import Space
+from behaviours.space import Space, check_addable
 from behaviours.storage import checksum
 from torchvsa import VSA, Readout, ShapeError
+from torchvsa._blocks import by_blocks
 from torchvsa._numerics import as_bipolar, is_integer
 from torchvsa.encoders.mirrored import mirrored
 
@@ -124,13 +125,7 @@ class Behaviour(Controller):
         if not weighted:
             raise ValueError("a sum of behaviours needs at least one with a weight that is not 0")
         space = weighted[0][0].space
-        if not all(space.same_as(part.space) for part, _ in weighted):
-            raise ValueError("behaviours over different spaces (other sensors, codes or seeds) do not add up")
-        if len({part.space.sensors for part, _ in weighted}) > 1:
-            raise ValueError(
-                "behaviours that use different sensors do not add up, since no condition is one of both; combine them "
-                "by a policy that asks each of them, such as MotorSchema or Priority"
-            )
+        check_addable([part.space for part, _ in weighted])
         terms = merge_terms([replace(t, weight=weight * t.weight) for part, weight in weighted for t in part.terms])
         if not terms:
             raise ValueError("the behaviours of this sum cancel each other, so that no term is left")
@@ -233,8 +228,9 @@ class Behaviour(Controller):
     def calibrate(self, demonstrations: Demonstrations, quantile: float = 0.02) -> None:
         """Set `threshold` to this quantile of the familiarity of the demonstrated conditions, each counted once."""
         cells = distinct_rows(self.space.cells(demonstrations.sensors, demonstrations.episodes))[0]
-        familiar = self.answer(cells).familiarity.to(torch.float64)
-        self.threshold = float(familiar.quantile(quantile, interpolation="lower"))
+        row_bytes = 8 * self.space.vsa.dim
+        familiar = by_blocks(lambda rows: familiarity(self.space.encode(rows), self.known), cells, row_bytes=row_bytes)
+        self.threshold = float(familiar.double().quantile(quantile, interpolation="lower"))
 
     def trainable(self) -> "Behaviour":
         """A copy over the same space whose program is a float `nn.Parameter`, for a PyTorch training loop.

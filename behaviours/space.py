@@ -205,6 +205,17 @@ class Space(nn.Module):
         return space
 
 
+def check_addable(spaces: Sequence[Space]) -> None:
+    """Raise `ValueError` unless behaviours over these spaces add up: codebooks and sensors that are used are equal."""
+    if not all(spaces[0].same_as(space) for space in spaces):
+        raise ValueError("behaviours over different spaces (other sensors, codes or seeds) do not add up")
+    if len({space.sensors for space in spaces}) > 1:
+        raise ValueError(
+            "behaviours that use different sensors do not add up, since no condition is one of both; combine them by a "
+            "policy that asks each of them, such as MotorSchema or Priority"
+        )
+
+
 def conditions_of(spaces: Sequence[Space], cells: Shaped[Tensor, "batch w"]) -> list[Shaped[Tensor, "batch d"]]:
     """The protected condition of each row of cells in each of these spaces, which differ in the sensors that are used.
 

@@ -9,6 +9,7 @@ from torch import Tensor
 from behaviours.algebra import stack_programs
 from behaviours.behaviour import Behaviour
 from behaviours.ordered import distinct_rows
+from behaviours.space import check_addable
 from torchvsa import Readout
 from torchvsa._blocks import by_blocks
 
@@ -23,10 +24,9 @@ def switching_weights(a: Behaviour, b: Behaviour, readings: Any) -> Float64[Tens
     inf where no weight changes the answer, for example because both answer alike; NaN where no sensor was observed. 0
     where a result that only `b` has scores higher in `a` than its own answer (a larger weight may restore the answer).
 
-    Raises `ValueError` for behaviours over different spaces, and for invalid readings.
+    Raises `ValueError` for behaviours that do not add up (other codes, other sensors), and for invalid readings.
     """
-    if not a.space.same_as(b.space):
-        raise ValueError("behaviours over different spaces (other sensors, codes or seeds) do not add up")
+    check_addable([a.space, b.space])
     space = a.space
     results, _ = distinct_rows(torch.cat([a.results, b.results.to(a.results.device)]))
     programs = stack_programs([part.program.detach().to(space.device) for part in (a, b)])

@@ -11,8 +11,9 @@ from behaviours.algebra import stack_programs
 from behaviours.bank import BehaviourBank
 from behaviours.demonstrations import Demonstrations
 from behaviours.ordered import distinct_rows
+from behaviours.space import conditions_of
 from behaviours.tables import to_int64
-from torchvsa import Readout, ShapeError
+from torchvsa import ShapeError
 from torchvsa._blocks import by_blocks
 from torchvsa._numerics import norms
 
@@ -73,14 +74,17 @@ def recognise(bank: BehaviourBank, readings: Any, commands: Any, runs: Any = Non
     results, _ = distinct_rows(torch.cat([bank[name].results for name in bank]))
     cells = space.cells(shown.sensors, run)
     labels = _labels(space.schema.command_levels(shown.commands).to(results.device), results)
-    programs = stack_programs([bank[name].program.detach() for name in bank])
-    readout = space.vsa.readout(programs, space.items(results))
+    parts, items = [bank[name] for name in bank], space.items(results)
+    programs = stack_programs([part.program.detach() for part in parts])
+    readouts = [space.vsa.readout(program, items) for program in programs]
     lengths = norms(programs)
     # Equal steps are charged alike.
     steps, step = distinct_rows(torch.cat([cells, labels[:, None].to(cells.dtype)], 1))
 
     def charges(rows: Shaped[Tensor, "rows w"]) -> Float64[Tensor, "rows b"]:
-        lead = _leads(readout, space.encode(rows[:, :-1]), rows[:, -1].to(torch.int64))
+        conditions = conditions_of([part.space for part in parts], rows[:, :-1])
+        scores = [readout(condition) for readout, condition in zip(readouts, conditions, strict=True)]
+        lead = _leads(torch.stack(scores, 1), rows[:, -1].to(torch.int64))
         return lead.clamp(max=0) / torch.where(lengths == 0, 1.0, lengths)
 
     charged = by_blocks(charges, steps, row_bytes=8 * space.vsa.dim)
@@ -102,11 +106,8 @@ def _labels(levels: Int64[Tensor, "N m"], results: Int64[Tensor, "K m"]) -> Int6
     return same.to(torch.int8).argmax(-1)
 
 
-def _leads(
-    readout: Readout, conditions: Shaped[Tensor, "rows d"], labels: Int64[Tensor, "rows"]
-) -> Float64[Tensor, "rows b"]:
+def _leads(scores: Float64[Tensor, "rows b K"], labels: Int64[Tensor, "rows"]) -> Float64[Tensor, "rows b"]:
     """The lead of the result `labels` over the best other one, for each program; inf if there is no other."""
-    scores = readout(conditions)
     chosen = labels[:, None, None].expand(-1, scores.shape[1], 1)
     others = scores.scatter(-1, chosen, -torch.inf)
     return scores.gather(-1, chosen)[..., 0] - others.amax(-1)

@@ -16,6 +16,8 @@ from behaviours import (
     OneShot,
     Priority,
     WinnerTakesAll,
+    recognise,
+    switching_weights,
 )
 
 
@@ -101,3 +103,12 @@ def test_a_threshold_is_what_nearly_all_of_its_own_conditions_reach() -> None:
     later = made["x"].threshold
     assert later is not None
     assert later <= threshold
+
+
+def test_what_a_robot_runs_is_recognised_by_the_sensors_of_each_behaviour() -> None:
+    made = bank()
+    readings = [[1.0, 2, 7], [4, 5, 3], [0, 0, 12], [8, 8, 12]]
+    commands = [[1.0, 0], [0, 1], [-1, -1], [-1, -1]]
+    assert recognise(made, readings, commands, [0, 0, 1, 1]).best == ["lights", "front"]
+    with pytest.raises(ValueError, match="use different sensors do not add up"):
+        switching_weights(made["lights"], made["front"], readings)
