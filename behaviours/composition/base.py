@@ -8,9 +8,11 @@ import torch
 from jaxtyping import Float64, Int64, Shaped
 from torch import Tensor, nn
 
+from behaviours.algebra import merged_results
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
+from behaviours.memory import ResultMemory
 from behaviours.options import as_float
 from behaviours.recall import Recall
 from behaviours.space import conditions_of
@@ -87,6 +89,18 @@ class Policy(Controller):
         return Recall(
             of_speaker("commands"), of_speaker("similarity"), of_speaker("margin"), of_speaker("familiarity"), speaker
         )
+
+    def joint_memory(self) -> ResultMemory:
+        """The results of all behaviours."""
+        results = merged_results([term for part in self.parts for term in part.terms])
+        return ResultMemory(self.space, results.to(self.space.device))
+
+    def weights_of(self, given: Mapping[str, float] | None) -> list[float]:
+        """One weight per behaviour, 1 for those that are not named. Raises `ValueError` if all are 0."""
+        weights = self.per_behaviour(given, [1.0] * len(self.names), "weights")
+        if not any(weights):
+            raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
+        return weights
 
     def per_behaviour(self, given: Mapping[str, float] | None, otherwise: Sequence[float], what: str) -> list[float]:
         """One number per behaviour.

@@ -37,10 +37,8 @@ class Bundle(Policy):
 
     def __init__(self, bank: BehaviourBank, weights: Mapping[str, float] | None = None) -> None:
         super().__init__(bank, bank.names)
-        self.weights = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
+        self.weights = self.weights_of(weights)
         """One weight per name."""
-        if not any(self.weights):
-            raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
         # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.
         row = torch.tensor(self.weights, dtype=torch.float64, device=self.space.device)
         self.register_buffer("_weights", row, persistent=False)

@@ -6,12 +6,12 @@ import torch
 from jaxtyping import Int64, Shaped
 from torch import Tensor
 
-from behaviours.algebra import merged_results, weighted_sum
+from behaviours.algebra import weighted_sum
 from behaviours.bank import BehaviourBank
 from behaviours.composition.base import Policy
 from behaviours.composition.choosing import seed_of
-from behaviours.memory import ResultMemory
 from behaviours.recall import Recall, familiarity
+from torchvsa._numerics import norms
 
 
 class Gated(Policy):
@@ -30,6 +30,7 @@ class Gated(Policy):
 
     program: Tensor
     contexts: Tensor
+    tag: Tensor
 
     def __init__(self, bank: BehaviourBank, seed: int = 0) -> None:
         super().__init__(bank, bank.names)
@@ -37,8 +38,7 @@ class Gated(Policy):
         generator = torch.Generator().manual_seed(seed_of(seed, 0))
         self.register_buffer("contexts", vsa.random(len(self.names), generator=generator, device=device))
         self.register_buffer("program", self._joined())
-        results = merged_results([term for part in self.parts for term in part.terms]).to(device)
-        self.memory = ResultMemory(self.space, results)
+        self.memory = self.joint_memory()
 
     def _joined(self) -> Shaped[Tensor, "d"]:
         vsa = self.space.vsa
@@ -46,6 +46,20 @@ class Gated(Policy):
             vsa.bind(part.program.detach(), context) for part, context in zip(self.parts, self.contexts, strict=True)
         ]
         return weighted_sum(vsa, [1] * len(bound), bound)
+
+    def longest(self) -> Tensor:
+        """The length of the longest program, to which a program that decides whom to ask is scaled."""
+        return torch.stack([norms(part.program.detach()) for part in self.parts]).max()
+
+    def draw_tag(self, seed: int) -> None:
+        """Draw the `tag` behind which a program that decides whom to ask is kept."""
+        generator = torch.Generator().manual_seed(seed_of(seed, 1))
+        self.register_buffer("tag", self.space.vsa.random(generator=generator, device=self.space.device))
+
+    def add_tagged(self, program: Shaped[Tensor, "d"]) -> None:
+        """Add a program behind the tag to the vector."""
+        vsa = self.space.vsa
+        self.program = weighted_sum(vsa, [1, 1], [self.program, vsa.bind(program, self.tag)])
 
     def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
         """See `Policy.query`."""

@@ -9,7 +9,7 @@ from torch import Tensor
 from behaviours.algebra import weighted_sum
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
-from behaviours.composition.choosing import common_space, naming_space, same_conditions, seed_of, with_length
+from behaviours.composition.choosing import common_space, naming_space, same_conditions, with_length
 from behaviours.composition.gated import Gated
 from behaviours.recall import Recall
 from behaviours.space import Space
@@ -41,7 +41,6 @@ class Hierarchy(Gated):
     Source: arbitration as a behaviour of its own, after Brooks 1986; programs with a context, Levy et al. 2013.
     """
 
-    tag: Tensor
     named: Tensor
     name_items: Tensor
 
@@ -64,11 +63,8 @@ class Hierarchy(Gated):
             named, items = chooser.results[:, 0].to(device), chooser.memory.current_items().to(device)
         self.register_buffer("named", named)
         self.register_buffer("name_items", items)
-        generator = torch.Generator().manual_seed(seed_of(seed, 1))
-        self.register_buffer("tag", vsa.random(generator=generator, device=device))
-        longest = torch.stack([norms(part.program.detach()) for part in parts]).max()
-        choice = with_length(choice, longest, exact=is_integer(self.program))
-        self.program = weighted_sum(vsa, [1, 1], [self.program, vsa.bind(choice, self.tag)])
+        self.draw_tag(seed)
+        self.add_tagged(with_length(choice, self.longest(), exact=is_integer(self.program)))
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:

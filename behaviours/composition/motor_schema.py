@@ -6,10 +6,8 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
-from behaviours.algebra import merged_results
 from behaviours.bank import BehaviourBank
 from behaviours.composition.base import Policy
-from behaviours.memory import ResultMemory
 from behaviours.options import as_bool
 from behaviours.recall import Recall
 from torchvsa.memory import best
@@ -37,15 +35,12 @@ class MotorSchema(Policy):
         self, bank: BehaviourBank, weights: Mapping[str, float] | None = None, familiarity: bool = True
     ) -> None:
         super().__init__(bank, bank.names)
-        self.weights = self.per_behaviour(weights, [1.0] * len(self.names), "weights")
+        self.weights = self.weights_of(weights)
         """One weight per name."""
-        if not any(self.weights):
-            raise ValueError(f"at least one weight must differ from 0; got 0 for each of {', '.join(self.names)}")
         self.familiarity = as_bool("familiarity", familiarity)
         row = torch.tensor(self.weights, dtype=torch.float64, device=self.space.device)
         self.register_buffer("_weights", row, persistent=False)
-        results = merged_results([term for part in self.parts for term in part.terms]).to(self.space.device)
-        self.memory = ResultMemory(self.space, results)
+        self.memory = self.joint_memory()
 
     def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
         """See `Policy.query`."""

@@ -10,13 +10,13 @@ from torch import Tensor
 from behaviours.algebra import weighted_sum
 from behaviours.bank import BehaviourBank
 from behaviours.composition.base import threshold_of
-from behaviours.composition.choosing import naming_space, numbered, seed_of, with_length
+from behaviours.composition.choosing import naming_space, numbered, with_length
 from behaviours.composition.gated import Gated
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import ErrorDriven, Rule, require_rule
 from behaviours.recall import Recall, over_unique_rows
 from torchvsa._blocks import by_blocks
-from torchvsa._numerics import is_integer, norms
+from torchvsa._numerics import is_integer
 
 Transitions = Mapping[tuple[str, str], Any]
 """Readings `[N, n]`, or demonstrations, by (name of the behaviour that has the floor, name of the next one)."""
@@ -60,7 +60,6 @@ class Sequencing(Gated):
     object with hyperdimensional computing".
     """
 
-    tag: Tensor
     name_items: Tensor
     follows: Tensor
     _thresholds: Tensor
@@ -75,8 +74,7 @@ class Sequencing(Gated):
         shown = _by_source(transitions or {}, self.names)
         space = naming_space(self.space, count, seed)
         follows = torch.zeros(count, count, dtype=torch.bool)
-        longest = torch.stack([norms(part.program.detach()) for part in self.parts]).max()
-        exact = is_integer(self.program)
+        longest, exact = self.longest(), is_integer(self.program)
         bound = []
         for source, labelled in shown.items():
             follows[source, labelled.commands[:, 0].long()] = True
@@ -84,13 +82,11 @@ class Sequencing(Gated):
             bound.append(vsa.bind(with_length(learned.program.detach(), longest, exact), self.contexts[source]))
         self.chained = bool(bound)
         """Whether there are transitions."""
-        generator = torch.Generator().manual_seed(seed_of(seed, 1))
-        self.register_buffer("tag", vsa.random(generator=generator, device=device))
+        self.draw_tag(seed)
         self.register_buffer("follows", follows.to(device))
         self.register_buffer("name_items", space.items(torch.arange(count, device=device)[:, None]))
         if bound:
-            chain = weighted_sum(vsa, [1] * len(bound), bound)
-            self.program = weighted_sum(vsa, [1, 1], [self.program, vsa.bind(chain, self.tag)])
+            self.add_tagged(weighted_sum(vsa, [1] * len(bound), bound))
         thresholds = [threshold_of(part) for part in self.parts]
         self.register_buffer("_thresholds", torch.tensor(thresholds, device=device), persistent=False)
 

@@ -21,7 +21,6 @@ import sim
 from behaviours import (
     Behaviour,
     BehaviourBank,
-    Controller,
     Demonstrations,
     ErrorDriven,
     Rule,
@@ -31,6 +30,7 @@ from behaviours import (
     switching_weight,
 )
 from experiments.tasks import corral
+from experiments.tasks.agreement import share_right
 from torchvsa import MAP
 from torchvsa.encoders import Level, Mirrored, Product
 
@@ -62,11 +62,6 @@ def space(seed: int, mirror: bool = False) -> Space:
     return Space(corral.schema(), Product(values, 3), seed=seed)
 
 
-def agreement(controller: Controller, shown: Demonstrations) -> float:
-    """The share of samples whose commands are recalled."""
-    return float((controller(shown.sensors).commands == shown.commands).all(1).double().mean())
-
-
 def sides(shown: Demonstrations) -> dict[str, Demonstrations]:
     """The samples that see the lamp on both sides, on the left only and on the right only."""
     fires = sim.Teacher().rule(shown.sensors.numpy())
@@ -86,7 +81,7 @@ def mirrored(codebooks: Sequence[int], demonstrations: int = 20, tested: int = 2
     for seed in codebooks:
         p = RULE.fit(space(seed, mirror=True), taught)
         made = {"p": p, "mirror": p.mirror(), "sum": p + p.mirror()}
-        rows.append({f"{name}.{side}": agreement(made[name], asked[side]) for name in made for side in asked})
+        rows.append({f"{name}.{side}": share_right(made[name], asked[side]) for name in made for side in asked})
     return rows
 
 

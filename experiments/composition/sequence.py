@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 import sim
-from behaviours import Actuator, BehaviourBank, Demonstrations, ErrorDriven, Rule, Schema, Sensor, Sequencing, Space
+from behaviours import BehaviourBank, Demonstrations, ErrorDriven, Rule, Sequencing, Space
 from experiments.tasks import corral
+from experiments.tasks.agreement import share_right
 from torchvsa import MAP
 from torchvsa.encoders import Level, Mirrored
 
@@ -47,23 +48,12 @@ def room(side: float = 4.0, apart: float = 2.0) -> sim.Arena:
     return sim.Arena(tuple(sim.walls(floor)), lamps, floor, outline)
 
 
-def schema() -> Schema:
-    """Two pairs of light sensors, the distance, and two wheels."""
-    return Schema(
-        [Sensor(channel.name, channel.low, channel.high, channel.unit, "clip") for channel in TASK.sensors],
-        [
-            Actuator(channel.name, channel.low, channel.high, channel.unit, levels=corral.COMMAND_LEVELS)
-            for channel in sim.ACTUATORS
-        ],
-    )
-
-
 def space(codebook: int) -> Space:
     """Level codes, in which one involution swaps the colours and leaves distance and wheels as they are."""
     columns = [channel.name for channel in TASK.sensors]
     pairs = [(columns.index(first), columns.index(second)) for first, second in MIRROR.items()]
     encoder = Mirrored(Level(MAP(DIM, dtype=torch.int8), BINS), pairs, len(columns))
-    return Space(schema(), encoder, seed=codebook, mirror=MIRROR)
+    return Space(corral.schema(sensors=TASK.sensors), encoder, seed=codebook, mirror=MIRROR)
 
 
 @dataclass(frozen=True)
@@ -110,8 +100,7 @@ def agreement(arena: sim.Arena, codebook: int, taught: Runs, tested: int = 200) 
     """The share of steps, of teachers on their way to yellow, at which 'to yellow' commands what they do."""
     asked = runs(arena, tested, "yellow", first=0)
     moving = asked.shown.where(~asked.arrived)
-    found = bank(codebook, taught)["to yellow"](moving.sensors).commands
-    return float((found == moving.commands).all(1).double().mean())
+    return share_right(bank(codebook, taught)["to yellow"], moving)
 
 
 def succeeds(controller: sim.ControllerLike, arena: sim.Arena, starts: Sequence[int], engine: str) -> NDArray[np.bool_]:

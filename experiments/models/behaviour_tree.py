@@ -9,7 +9,6 @@ from jaxtyping import Shaped
 from py_trees import behaviour
 from py_trees.common import Status
 from py_trees.composites import Selector
-from py_trees.composites import Sequence as InTurn
 from py_trees.trees import BehaviourTree as Tree
 from torch import Tensor
 
@@ -29,7 +28,7 @@ class _Leaf(behaviour.Behaviour):
 
 
 class BehaviourTree(Policy):
-    """A selector over one sequence for each behaviour: *it knows the condition*, then *let it speak*.
+    """A selector over the behaviours: the first that knows the condition succeeds, and speaks.
 
     The last one speaks without being asked whether it knows. A condition is known from a familiarity of
     `Behaviour.threshold` on.
@@ -41,8 +40,7 @@ class BehaviourTree(Policy):
         super().__init__(bank, bank.names)
         last = len(self.names) - 1
         self._leaves = [_Leaf(name, number, number == last) for number, name in enumerate(self.names)]
-        branches = [InTurn(f"let {leaf.name}", memory=False, children=[leaf]) for leaf in self._leaves]
-        self._tree = Tree(Selector("who", memory=False, children=branches))
+        self._tree = Tree(Selector("who", memory=False, children=self._leaves))
 
     def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
         """See `Policy.query`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -88,10 +88,13 @@ class Paper(Printed):
     rule: Part = part("rule", "literal", "how a program is learned")
 
 
-def schema(out_of_range: Literal["error", "clip"] = "clip") -> Schema:
-    """The corral robot's sensors and actuators. Live readings outside a range are clipped, unless told otherwise."""
+def schema(out_of_range: Literal["error", "clip"] = "clip", sensors: Sequence[sim.Channel] = sim.SENSORS) -> Schema:
+    """The corral robot's sensors, or those of another task, and its actuators.
+
+    Live readings outside a range are clipped, unless told otherwise.
+    """
     return Schema(
-        [Sensor(channel.name, channel.low, channel.high, channel.unit, out_of_range) for channel in sim.SENSORS],
+        [Sensor(channel.name, channel.low, channel.high, channel.unit, out_of_range) for channel in sensors],
         [
             Actuator(channel.name, channel.low, channel.high, channel.unit, levels=COMMAND_LEVELS)
             for channel in sim.ACTUATORS
