@@ -109,7 +109,7 @@ def test_a_chooser_of_other_behaviours_is_refused() -> None:
     with pytest.raises(ValueError, match="learned over other conditions"):
         Hierarchy(behaviours, choosing(bank(seed=1), PARTS))
     with pytest.raises(TypeError, match="chooser is a behaviour"):
-        Hierarchy(behaviours, "few")  # pyright: ignore[reportArgumentType]
+        Hierarchy(behaviours, "few")  # pyright: ignore[reportArgumentType] (refused)
 
 
 def test_choosing_needs_demonstrations_of_behaviours_of_the_bank() -> None:

@@ -106,7 +106,8 @@ def test_a_gated_vector_holds_all_programs_behind_their_contexts() -> None:
     shown = random_pairs(16)
     recall = policy(shown.sensors)
     assert recall.commands.tolist() == shown.commands.tolist()
-    assert recall.speaker.tolist() == [0] * 2 + [1] * 5 + [2] * 9  # pyright: ignore[reportOptionalMemberAccess]
+    assert recall.speaker is not None
+    assert recall.speaker.tolist() == [0] * 2 + [1] * 5 + [2] * 9
     assert not torch.equal(Gated(made, seed=4).contexts, policy.contexts)
 
 

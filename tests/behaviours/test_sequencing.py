@@ -141,7 +141,7 @@ def test_transitions_that_cannot_work_are_refused() -> None:
     with pytest.raises(ValueError, match=r"'a' hands over, but is not told when to go on"):
         Sequencing(behaviours, {("a", "b"): NEXT})
     with pytest.raises(TypeError, match=r"transitions map \(from, to\) to readings"):
-        Sequencing(behaviours, [("a", "b")])  # pyright: ignore[reportArgumentType]
+        Sequencing(behaviours, [("a", "b")])  # pyright: ignore[reportArgumentType] (refused)
     with pytest.raises(ValueError, match="at least one row"):
         Sequencing(behaviours, {("a", "a"): ROWS[:0]})
     with pytest.raises(ValueError, match="sensor 'left' reads 99"):

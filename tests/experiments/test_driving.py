@@ -51,7 +51,7 @@ def test_each_condition_is_asked_once() -> None:
     for controller in (behaviour, behaviour.freeze(), Bundle(bank)):
         asked: list[int] = []
         answer = controller.answer
-        controller.answer = lambda cells, answer=answer, asked=asked: (asked.append(len(cells)), answer(cells))[1]  # pyright: ignore[reportAttributeAccessIssue]
+        controller.answer = lambda cells, answer=answer, asked=asked: (asked.append(len(cells)), answer(cells))[1]  # pyright: ignore[reportAttributeAccessIssue] (counted)
         once = AskedOnce(controller)
         for _ in range(2):
             found, right = once(rows.numpy()), answer(controller.space.cells(rows))

@@ -77,8 +77,8 @@ WRONG: dict[str, Any] = {
     r"each column at most once; got \[\]": lambda: Mirrored(LEVEL, [], 3),
     r"each column at most once; got \[\(0, 1, 2\)": lambda: Mirrored(LEVEL, [(0, 1, 2)], 3),
     r"each column at most once; got \[\(-1": lambda: Mirrored(LEVEL, [(-1, 0)], 3),
-    r"each column at most once; got \[0, 1\]": lambda: Mirrored(LEVEL, [0, 1], 3),  # type: ignore[list-item]
-    "each column at most once; got 'left'": lambda: Mirrored(LEVEL, [("left", "right")], 3),  # type: ignore[list-item]
+    r"each column at most once; got \[0, 1\]": lambda: Mirrored(LEVEL, [0, 1], 3),  # type: ignore[list-item] (refused)
+    "each column at most once; got 'left'": lambda: Mirrored(LEVEL, [("left", "right")], 3),  # type: ignore[list-item] (refused)
     "pairs name column 3; with 3 sensors the last one is 2": lambda: Mirrored(LEVEL, [(0, 3)], 3),
     "sensors 0 and 1 are a pair": lambda: Mirrored([LEVEL, Level(MAP, 9), LEVEL], [(0, 1)]),
     "sensors 1 and 2 are a pair": lambda: Mirrored([LEVEL, Level(MAP, 8, seed=0), Level(MAP, 8, seed=1)], [(1, 2)]),
