@@ -20,6 +20,7 @@ from jaxtyping import Float, Float64, Int64, Shaped
 from torch import Tensor
 
 from behaviours import Actuator, Schema, Sensor, Space
+from experiments.kit import Column, Table
 from torchvsa import architecture, recall_probability
 from torchvsa.encoders import Lookup, Product
 
@@ -251,12 +252,8 @@ def misses(rows: Sequence[dict[str, float]], most: int = DISTINCT) -> dict[str, 
 
 def table(rows: Sequence[dict[str, float]]) -> str:
     """The rows of `capacity` or `contradictions` as a Markdown table."""
-    names = list(rows[0])
-    lines = [names, ["---"] * len(names)]
-    lines += [
-        [f"{row[name]:.3f}" if "." in name or name == "votes" else f"{row[name]:.0f}" for name in names] for row in rows
-    ]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    columns = [Column(name, name, ".3f" if "." in name or name == "votes" else ".0f") for name in rows[0]]
+    return Table("Recall", columns).show(rows).markdown()
 
 
 def _mean(rows: Sequence[dict[str, float]]) -> dict[str, float]:

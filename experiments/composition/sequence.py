@@ -20,6 +20,7 @@ from torch import Tensor
 
 import sim
 from behaviours import BehaviourBank, Demonstrations, ErrorDriven, Rule, Sequencing, Space
+from experiments.kit import Column, Table
 from experiments.tasks import corral
 from experiments.tasks.agreement import share_right
 from torchvsa import MAP
@@ -134,9 +135,9 @@ def compare(
 
 def table(rows: dict[str, dict[str, Any]]) -> str:
     """The rows of `compare` as a Markdown table."""
-    lines = [
-        f"| {name} | {row['success_rate']:.3f} [{row['success_low']:.3f}, {row['success_high']:.3f}] "
-        f"| {row['episodes']} |"
-        for name, row in rows.items()
+    columns = [
+        Column("row"),
+        Column("success_rate", "success", ".3f", interval=("success_low", "success_high")),
+        Column("episodes", "starts", ".0f"),
     ]
-    return "\n".join(["| row | success | starts |", "|---|---|---|", *lines])
+    return Table("In sequence", columns).show([{"row": name, **row} for name, row in rows.items()]).markdown()
