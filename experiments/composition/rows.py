@@ -192,7 +192,10 @@ ROWS: dict[str, Line] = {
     ),
     "joint_program": Line(together, "one program learned from all demonstrations"),
     "evident_sum": Line(evident_sum, "a plain sum of programs learned apart, silent where only others know"),
-    "masked_priority": Line(masked(Priority), "each behaviour sees its own sensors; the first that knows speaks"),
+    "masked_priority": Line(
+        masked(lambda bank: Priority(bank, by="similarity")),
+        "each behaviour sees its own sensors; the first whose answer is clear speaks",
+    ),
     "masked_winner": Line(masked(WinnerTakesAll), "the same; the one that knows best speaks"),
     "masked_sum": Line(masked_sum, "the same; scores are added, those of seek louder"),
     "behaviour_tree": Line(masked(BehaviourTree), "the same behaviours as leaves of a py_trees selector"),
