@@ -11,6 +11,7 @@ import os
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import matplotlib
 import matplotlib.colors
@@ -96,11 +97,11 @@ def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = No
 def animate(
     rollouts: Sequence[Rollout],
     titles: Sequence[str],
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | BinaryIO,
     episode: int | None = None,
     speed: float = 2.0,
     frames: int = 150,
-) -> Path:
+) -> None:
     """Write a GIF of one episode of several rollouts side by side, with trails and the time.
 
     Shows the robot's outline, its lit light sensors and its distance beam, from the recorded readings. The file is
@@ -109,7 +110,7 @@ def animate(
     Args:
         rollouts: recorded rollouts in the same arena.
         titles: one per rollout.
-        path: the file to write; its folder must exist.
+        path: the file to write, whose folder must exist; or an open binary file.
         episode: its number; by default the one of median length among those that succeed in the most rollouts.
         speed: playback speed relative to real time.
         frames: maximum number of frames; a longer episode is drawn in larger steps.
@@ -127,25 +128,25 @@ def animate(
         _Panel(rollout.slice(chosen), title, rollout.arena, rollout.task)
         for rollout, title in zip(rollouts, titles, strict=True)
     ]
-    return _write_gif(panels, Path(path), speed, frames)
+    _write_gif(panels, path, speed, frames)
 
 
 def animate_steps(
     steps: Steps,
     title: str,
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | BinaryIO,
     arena: Arena,
     speakers: Sequence[str],
     task: Task | None = None,
     speed: float = 2.0,
     frames: int = 150,
-) -> Path:
+) -> None:
     """Write a GIF of the recorded steps of one episode, as `animate` does, with the behaviour that speaks at each.
 
     Args:
         steps: the control steps.
         title: written above the picture.
-        path: the file to write; its folder must exist.
+        path: the file to write, whose folder must exist; or an open binary file.
         arena: where the robot drove.
         speakers: a name for each step: what is written below the picture, and says the colour (see `COLOURS`).
         task: says what the columns of the readings are; by default that of the arena.
@@ -158,10 +159,10 @@ def animate_steps(
     if len(steps) != len(speakers) or not len(steps):
         raise ValueError(f"{len(steps)} steps and {len(speakers)} speakers; expected one speaker per step")
     panel = _Panel(steps, title, arena, Task.of(arena) if task is None else task, speakers)
-    return _write_gif([panel], Path(path), speed, frames)
+    _write_gif([panel], path, speed, frames)
 
 
-def _write_gif(panels: Sequence[_Panel], path: Path, speed: float, frames: int) -> Path:
+def _write_gif(panels: Sequence[_Panel], path: str | os.PathLike[str] | BinaryIO, speed: float, frames: int) -> None:
     if speed <= 0 or frames < 1:
         raise ValueError(f"speed={speed}, frames={frames}; expected a speed above 0 and at least 1 frame")
     length = max(len(panel) for panel in panels)
@@ -177,7 +178,10 @@ def _write_gif(panels: Sequence[_Panel], path: Path, speed: float, frames: int) 
         buffer, "GIF", save_all=True, append_images=images[1:], loop=0, optimize=False,
         duration=[delay] * (len(images) - 1) + [1500],
     )  # fmt: skip
-    return _write(path, buffer.getvalue())
+    if isinstance(path, str | os.PathLike):
+        _write(Path(path), buffer.getvalue())
+    else:
+        path.write(buffer.getvalue())
 
 
 def _typical(rollouts: Sequence[Rollout]) -> int:
@@ -326,7 +330,7 @@ def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, size)
 
 
-def _write(path: Path, content: bytes) -> Path:
+def _write(path: Path, content: bytes) -> None:
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -336,4 +340,3 @@ def _write(path: Path, content: bytes) -> Path:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-    return path

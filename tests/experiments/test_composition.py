@@ -112,7 +112,7 @@ def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path) -> None:
     assert rows["teacher"]["agreement"] == 1.0
     assert rows["joint_program"]["agreement"] > 0.9
     assert rows["sequencing"]["starts"] == 5
-    assert (tmp_path / "animations" / "sequencing.gif").is_file()
+    assert (tmp_path / "figures" / "animation_sequencing.gif").is_file()
     spoken = set(pd.read_parquet(tmp_path / "paths" / "bundle.parquet").speaker)
     assert spoken <= {"retreat", "seek_light", "avoid", "cruise"}
     near, far = [[9.0, 9.0, 0.01]], [[9.0, 9.0, 1.0]]
