@@ -1,6 +1,6 @@
 """Combine behaviours by priority: the first one that knows the condition answers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import torch
@@ -8,8 +8,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 
 from behaviours.bank import BehaviourBank
-from behaviours.behaviour import Behaviour
-from behaviours.composition.base import Policy, threshold_of
+from behaviours.composition.base import THRESHOLDS, Policy
 from behaviours.recall import Recall
 
 
@@ -43,13 +42,13 @@ class Priority(Policy):
         thresholds: Mapping[str, float] | None = None,
         by: Literal["familiarity", "similarity"] = "familiarity",
     ) -> None:
-        if by not in _THRESHOLD:
-            raise ValueError(f"by={by!r}: expected one of {', '.join(map(repr, _THRESHOLD))}")
+        if by not in THRESHOLDS:
+            raise ValueError(f"by={by!r}: expected one of {', '.join(map(repr, THRESHOLDS))}")
         if isinstance(order, str):
             raise TypeError(f"order is a list of names, the highest priority first; write [{order!r}] for {order!r}")
         super().__init__(bank, bank.names if order is None else list(order))
         self.by = by
-        defaults = [_THRESHOLD[by](part) for part in self.parts]
+        defaults = [THRESHOLDS[by](part) for part in self.parts]
         self.thresholds = self.per_behaviour(thresholds, defaults, "thresholds")
         # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.
         column = torch.tensor(self.thresholds, device=self.space.device)[:, None]
@@ -62,11 +61,3 @@ class Priority(Policy):
         known = above >= 0
         speaker = torch.where(known.any(0), known.to(torch.int8).argmax(0), above.argmax(0))
         return self.spoken(answers, speaker)
-
-
-def _half_similarity(part: Behaviour) -> float:
-    """Half of the similarity that nearly all of the behaviour's own conditions reach; 0 if that is unknown."""
-    return 0.5 * (part.least_similarity or 0.0)
-
-
-_THRESHOLD: dict[str, Callable[[Behaviour], float]] = {"familiarity": threshold_of, "similarity": _half_similarity}

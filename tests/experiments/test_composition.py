@@ -104,16 +104,15 @@ def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path) -> None:
 
     BEHAVIOURS.register("retreat", retreat)
     settings = composed(
-        study, *SMALL, "behaviours=[retreat,seek_light,avoid,cruise]", "rows=[teacher,joint_program,bundle,sequencing]",
+        study, *SMALL, "behaviours=[retreat,seek_light,avoid,cruise]", "rows=[teacher,sequencing]",
         "bullet_rows=[]", "arenas=[large]", "starts=5", "seconds=8", "workers=1",
     )  # fmt: skip
     outcome = run(study, settings, tmp_path, Console(quiet=True))
     rows = {row["row"]: row for row in outcome.table}
     assert rows["teacher"]["agreement"] == 1.0
-    assert rows["joint_program"]["agreement"] > 0.9
     assert rows["sequencing"]["starts"] == 5
     assert (tmp_path / "figures" / "animation_sequencing.gif").is_file()
-    spoken = set(pd.read_parquet(tmp_path / "paths" / "bundle.parquet").speaker)
+    spoken = set(pd.read_parquet(tmp_path / "paths" / "sequencing.parquet").speaker)
     assert spoken <= {"retreat", "seek_light", "avoid", "cruise"}
     near, far = [[9.0, 9.0, 0.01]], [[9.0, 9.0, 1.0]]
     rules = Precedence(settings.behaviours)
@@ -170,13 +169,15 @@ def test_a_behaviour_tree_is_a_priority() -> None:
     what = shown()
     bank = what.evident_bank(0, MASKS)
     readings = what.train.sensors[::7]
-    tree, priority = BehaviourTree(bank)(readings), Priority(bank)(readings)
-    limits = [part.threshold or 0 for part in Priority(bank).parts]
-    familiar = np.stack([bank[name](readings).familiarity.numpy() for name in bank], 1)
-    clear = (np.abs(familiar - limits) > 1e-5).all(1) & (familiar >= limits).any(1)
-    assert tree.speaker is not None
-    assert priority.speaker is not None
-    assert tree.speaker.numpy()[clear].tolist() == priority.speaker.numpy()[clear].tolist()
+    for by in ("familiarity", "similarity"):
+        tree, priority = BehaviourTree(bank, by)(readings), Priority(bank, by=by)
+        found = np.stack([getattr(bank[name](readings), by).numpy() for name in bank], 1)
+        known = (found >= np.array(priority.thresholds)).any(1)
+        assert known.sum() > 20
+        assert tree.speaker is not None
+        speaker = priority(readings).speaker
+        assert speaker is not None
+        assert tree.speaker.numpy()[known].tolist() == speaker.numpy()[known].tolist()
 
 
 def test_a_tree_lets_the_last_one_speak_where_nobody_knows() -> None:
