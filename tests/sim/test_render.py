@@ -90,9 +90,9 @@ def test_an_animation_shows_who_speaks(pair: tuple[Rollout, Rollout], tmp_path: 
 
 def test_the_animation_of_the_most_typical_episode(pair: tuple[Rollout, Rollout]) -> None:
     lengths = {int(e): int(s) for e, s in zip(pair[0].episode, pair[0].steps, strict=True)}
-    assert lengths[render._typical([pair[0]])] == sorted(lengths.values())[2]
+    assert lengths[render.typical([pair[0]])] == sorted(lengths.values())[2]
     one_wins = dataclasses.replace(pair[0], success=np.array([False, False, False, True, False]))
-    assert render._typical([pair[0], one_wins]) == 3
+    assert render.typical([pair[0], one_wins]) == 3
 
 
 def test_a_long_episode_is_drawn_in_larger_steps(pair: tuple[Rollout, Rollout], tmp_path: Path) -> None:
