@@ -229,7 +229,7 @@ def test_what_else_can_be_written(tmp_path: Path) -> None:
 
 def test_a_folder_that_is_not_there_is_told_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module.torch.export, "export", lambda *_, **__: pytest.fail("exported before it was told"))
-    with pytest.raises(OSError, match="cannot write .*behaviour.onnx"):
+    with pytest.raises(OSError, match=r"cannot write .*behaviour\.onnx"):
         to_onnx(OneShot().fit(space(64), random_pairs(3)), tmp_path / "nowhere" / "behaviour.onnx")
 
 
