@@ -36,7 +36,8 @@ def to_onnx(behaviour: Behaviour | Policy, path: str | Path) -> Path:
     actuators as JSON. Integer codes give the same bits as the module. (`torch.onnx.export(behaviour, (readings,),
     dynamo=True, dynamic_shapes=({0: "batch"},))` writes the same graph.)
 
-    Raises `ImportError` without the packages, and `ValueError` for complex codes (FHRR), which ONNX lacks.
+    Raises `ImportError` without the packages, `OSError` if the file cannot be written, and `ValueError` for complex
+    codes (FHRR), which ONNX lacks.
 
         >>> to_onnx(bank["seek_light"], "seek_light.onnx")                                  # doctest: +SKIP
         >>> session = onnxruntime.InferenceSession("seek_light.onnx")                       # doctest: +SKIP
@@ -47,6 +48,8 @@ def to_onnx(behaviour: Behaviour | Policy, path: str | Path) -> Path:
         raise ValueError(
             f"ONNX has no complex numbers, so that {space.vsa} cannot be exported; use a real architecture"
         )
+    if not Path(path).absolute().parent.is_dir():  # told before seconds of work
+        raise FileNotFoundError(f"cannot write {path}: there is no such folder")
     answer = _Answer(behaviour)
     names = list(OUTPUTS if isinstance(behaviour, Policy) else OUTPUTS[:-1])
     # Two rows: a batch size of 1 would be taken as constant.

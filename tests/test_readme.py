@@ -1,5 +1,7 @@
 """What the README says is true."""
 
+import contextlib
+import io
 import json
 import re
 import tomllib
@@ -16,24 +18,30 @@ README = (ROOT / "README.md").read_text()
 FIRST, SAVE, ALGEBRA, KINDS, PAPER, CLASSIFIER, SUMS, _ = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
 
 
-def run(code: str, cwd: Path | None = None) -> str:
-    done = python(None, code, "-W", "error", cwd=cwd)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+def run(code: str) -> str:
+    """What code prints that begins anew in this process, whose tests take warnings for errors."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile(code, "README.md", "exec"), {"__name__": "__main__"})
+    return printed.getvalue()
 
 
 def test_the_first_lines_are_few_run_and_answer() -> None:
     assert len([line for line in FIRST.splitlines() if line.strip()]) <= 10
     code = FIRST + "\nassert recall.commands.tolist() == [[1.0], [-1.0]], recall\n"
     code += "assert 'program' in steer.state_dict() and steer.program.shape == (4000,)\n"
-    assert "program" in run(code)
+    # In a process of its own, as a user runs it.
+    done = python(None, code, "-W", "error")
+    assert done.returncode == 0, done.stderr
+    assert "program" in done.stdout
 
 
-def test_a_saved_bank_holds_the_behaviour(tmp_path: Path) -> None:
+def test_a_saved_bank_holds_the_behaviour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     save, load, load_state = SAVE.splitlines()
     same = "torch.equal(again(readings).commands, steer(readings).commands)"
     code = [FIRST, save, load, f"assert {same}", "again.program.zero_()", f"assert not {same}", load_state]
-    run("\n".join([*code, f"assert {same}"]), tmp_path)
+    run("\n".join([*code, f"assert {same}"]))
 
 
 def test_the_algebra_finds_the_colour_of_the_ball() -> None:

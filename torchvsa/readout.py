@@ -7,7 +7,7 @@ from jaxtyping import Float64, Shaped
 from torch import Tensor, nn
 
 from torchvsa._blocks import by_blocks
-from torchvsa._numerics import as_bipolar, in_units, inner_products, is_integer, norms, over_lengths
+from torchvsa._numerics import as_bipolar, in_units, inner_products, is_integer, norms
 from torchvsa.errors import ShapeError
 from torchvsa.memory import Match, best
 
@@ -61,6 +61,7 @@ class Readout(nn.Module):
         if lengths is None:
             items, _ = in_units(items)
             lengths = norms(items)
+            lengths = torch.where(lengths == 0, 1.0, lengths)  # products with zero vectors are 0 already
         self.vsa = vsa
         folded = vsa.fold(_wide(programs, items)[..., None, :], items) if vsa.bilinear else None
         buffers = {"programs": programs, "units": units, "items": items, "lengths": lengths, "folded": folded}
@@ -73,7 +74,7 @@ class Readout(nn.Module):
 
     def forward(self, conditions: Shaped[Tensor, "batch d"]) -> Float64[Tensor, "batch *b K"]:
         """The score of each item for each condition."""
-        scores = over_lengths(self._products(conditions).to(torch.float64), self.lengths)
+        scores = self._products(conditions).to(torch.float64) / self.lengths
         return scores if self.units is None else scores * self.units.to(torch.float64)
 
     def match(self, conditions: Shaped[Tensor, "batch d"]) -> Match:
@@ -82,13 +83,15 @@ class Readout(nn.Module):
             # Products and lengths both take float64; convert once.
             conditions = as_bipolar(conditions).to(torch.float64)
         products = self._products(conditions)
-        return best(over_lengths(products.to(torch.float64), self.lengths), self.noise(conditions))
+        return best(products.to(torch.float64) / self.lengths, self.noise(conditions))
 
     def _products(self, conditions: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch *b K"]:
         self.vsa.check(conditions, "conditions")
-        shape = *self.programs.shape[:-1], len(self.items)
-        if self.folded is not None:
-            return inner_products(conditions, self.folded.flatten(0, -2)).unflatten(-1, shape)
+        folded = self.folded
+        if folded is not None and folded.dim() == 2:
+            return inner_products(conditions, folded)
+        if folded is not None:
+            return inner_products(conditions, folded.flatten(0, -2)).unflatten(-1, folded.shape[:-1])
         row_bytes = self.programs.numel() * max(self.programs.element_size(), 4)
         return by_blocks(lambda rows: inner_products(self._unbound(rows), self.items), conditions, row_bytes=row_bytes)
 

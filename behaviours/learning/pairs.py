@@ -9,7 +9,7 @@ from torch import Tensor
 from behaviours.learning.conditions import LazyConditions
 from behaviours.learning.samples import Samples
 from torchvsa import VSA, Readout
-from torchvsa._numerics import norms
+from torchvsa._numerics import as_bipolar, norms
 
 
 class Verdict(NamedTuple):
@@ -79,7 +79,7 @@ class Pairs:
         return change if subtract < 0 else change - self._bound(condition, subtract)
 
     def _bound(self, condition: Shaped[Tensor, "d"], result: int) -> Shaped[Tensor, "d"]:
-        return self.vsa.superpose(self.vsa.bind(self.items[result], condition)[None])
+        return as_bipolar(self.vsa.bind(self.items[result], condition)).to(self.vsa.accumulator)
 
     def _judge(self, scores: Float64[Tensor, "rows r"], start: int) -> Verdict:
         rows = slice(start, start + len(scores))

@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Patch, PathPatch
+from matplotlib.path import Path
 
 import sim
 from experiments.corral.command_map import COMMANDS, DISTANCE, SLICES, Slice
@@ -109,7 +110,13 @@ def draw_slice(axes: Axes, plane: Slice, cells: pd.DataFrame) -> None:
         column.to_numpy().reshape(bins, bins) for column in (cells.learned, cells.learned != cells.teacher)
     )
     axes.pcolormesh(*edges, learned, cmap=ListedColormap(list(COLOURS.values())), vmin=-0.5, vmax=len(COMMANDS) - 0.5)
-    axes.pcolor(*edges, np.ma.masked_equal(differs, False), facecolor="none", edgecolor=HATCH, hatch="/////", lw=0)
+    # One path of all cells: a hatch for each cell would take three times as long.
+    rows, columns = np.nonzero(differs)
+    across, up = np.array([0, 1, 1, 0, 0]), np.array([0, 0, 1, 1, 0])
+    corners = [edges[0][columns[:, None] + across], edges[1][rows[:, None] + up]]
+    codes = [Path.MOVETO, Path.LINETO, Path.LINETO, Path.LINETO, Path.CLOSEPOLY]
+    hatched = Path(np.stack(corners, -1).reshape(-1, 2), codes * len(rows))
+    axes.add_patch(PathPatch(hatched, facecolor="none", edgecolor=HATCH, hatch="/////", lw=0))
     met = cells.loc[cells.samples > 0]
     # The area grows with the logarithm, or the few cells of the straight runs would hide all others.
     area = 1.5 + 14 * np.log1p(met.samples) / np.log1p(met.samples.max())

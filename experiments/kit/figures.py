@@ -57,11 +57,14 @@ def drawn(draw: Callable[[], Figure]) -> bytes:
 def png(figure: Figure, dpi: int = 120) -> bytes:
     """A figure as the bytes of a PNG file; the same figure gives the same bytes."""
     import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     buffer = io.BytesIO()
+    figure.set_dpi(dpi)
     with matplotlib.rc_context(STYLE):
-        # Without the version of matplotlib, which it would write into the file.
-        figure.savefig(buffer, format="png", dpi=dpi, metadata={"Software": None})
+        # `savefig` draws twice where there is a layout engine. Without the version of matplotlib, which it would write
+        # into the file.
+        FigureCanvasAgg(figure).print_png(buffer, metadata={"Software": None})
     return buffer.getvalue()
 
 

@@ -16,7 +16,7 @@ def one_thread() -> Iterator[None]:
     torch.set_num_threads(before)
 
 
-@pytest.fixture(scope="module", params=DEVICES)
+@pytest.fixture(scope="session", params=DEVICES)
 def there(request: pytest.FixtureRequest) -> Iterator[Callable[..., None]]:
     """`there(check, *arguments)` in a process with another device."""
     with another_device(request.param) as run:

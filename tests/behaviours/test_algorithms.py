@@ -127,7 +127,7 @@ def test_a_long_demonstration_that_forgets(clip: bool) -> None:
 @pytest.mark.filterwarnings("ignore::behaviours.learning.ConvergenceWarning")
 def test_threads_and_chunks_change_no_bit(rule: Rule, dtype: str) -> None:
     shown = random_pairs(30)
-    asked = torch.from_numpy(np.random.default_rng(1).uniform(0, 20, (50, 3)))
+    asked = torch.from_numpy(np.random.default_rng(1).uniform(0, 20, (21, 3)))
     asked[::9, 1] = torch.nan
 
     def bits(threads: int, chunk: int) -> list[torch.Tensor]:

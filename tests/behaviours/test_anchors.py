@@ -53,9 +53,9 @@ def test_the_similarity_rule_takes_distinct_conditions_for_known(clip: bool, tak
     assert all(report.new + report.falsely_known == 50 for report in reports)
 
 
-@pytest.mark.parametrize("count", [400, pytest.param(800, marks=pytest.mark.slow)])
-def test_a_trained_program_holds_hundreds(count: int) -> None:
-    shown = random_pairs(count)
+@pytest.mark.slow
+def test_a_trained_program_holds_hundreds() -> None:
+    shown = random_pairs(800)
     behaviour = ErrorDriven().fit(space(4000, protection={"name": "self_shift", "width": "sum"}), shown)
     assert behaviour.report.wrong == 0
     assert correct(behaviour, shown).mean() == 1

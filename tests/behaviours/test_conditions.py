@@ -6,7 +6,7 @@ import pytest
 import torch
 from robots import random_pairs, same_bits, space
 
-from behaviours import RULES, Demonstrations, Gradient
+from behaviours import RULES, Demonstrations, ErrorDriven, Gradient
 from behaviours.learning import conditions
 from behaviours.learning.conditions import LazyConditions
 from behaviours.learning.samples import Samples
@@ -19,7 +19,8 @@ def shown() -> Demonstrations:
 
 
 def rule(name: str) -> Any:
-    return Gradient(epochs=3) if name == "gradient" else RULES[name]()
+    short = {"gradient": Gradient(epochs=3), "error_driven": ErrorDriven(epochs=3)}
+    return short[name] if name in short else RULES[name]()
 
 
 @pytest.mark.parametrize("name", RULES)

@@ -14,8 +14,7 @@ SPREAD = {"name": "self_shift", "width": "sum"}
 """Pairs that hardly disturb each other, so that what is left to learn is the rule's."""
 
 
-@pytest.mark.parametrize("loss", ["cross_entropy", "hinge", "squared"])
-@pytest.mark.parametrize("sparse", [False, True])
+@pytest.mark.parametrize(("loss", "sparse"), [("cross_entropy", False), ("hinge", True), ("squared", False)])
 def test_every_loss_learns_what_one_superposition_cannot(loss: Any, sparse: bool) -> None:
     shown = random_pairs(300)
     behaviour = Gradient(loss, epochs=60, batch_size=32, learning_rate=0.1, sparse=sparse).fit(

@@ -20,12 +20,15 @@ def minds(made: Space) -> dict[str, Callable[[Any], Recall]]:
     return {"low": bank["low"], **{name: cast(Any, policy)(bank) for name, policy in POLICIES.items()}}
 
 
-def readings(columns: int) -> Tensor:
-    """400 rows, 31 of them distinct: some with unobserved sensors, and one with nothing else."""
-    rows = [row + row[: columns - 3] for row in random_pairs(30).sensors.tolist()]
-    rows = torch.tensor([*rows, [math.nan] * columns], dtype=torch.float64)
+def distinct() -> Tensor:
+    """31 rows: some with unobserved sensors, and one with nothing else."""
+    rows = torch.cat([random_pairs(30).sensors, torch.full((1, 3), math.nan, dtype=torch.float64)])
     rows[::7, 1] = torch.nan
-    return rows[torch.randint(len(rows), (400,), generator=torch.Generator().manual_seed(0))]
+    return rows
+
+
+REPEATED = torch.randint(31, (400,), generator=torch.Generator().manual_seed(0))
+"""The one of `distinct` in each of 400 rows."""
 
 
 @pytest.mark.parametrize("mind", ["low", *POLICIES])
@@ -33,17 +36,17 @@ def readings(columns: int) -> Tensor:
 def test_repeated_readings_are_answered_as_alone(vsa: str, mind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made = space(300, vsa)
     asked = minds(made)[mind]
-    rows = readings(3)
+    rows = distinct()[REPEATED]
     encoded: list[int] = []
     encode = made.encode
     monkeypatch.setattr(made, "encode", lambda cells: (encoded.append(len(cells)), encode(cells))[1])
     whole = asked(rows)
     assert sum(encoded) <= 31
-    alone = [asked(row[None]) for row in rows]
+    alone = [asked(row[None]) for row in distinct()]
     assert whole.commands.isnan().all(1).any()
     for field, value in whole._asdict().items():
         if value is not None:
-            assert same_bits(value, torch.cat([getattr(recall, field) for recall in alone]))
+            assert same_bits(value, torch.cat([getattr(recall, field) for recall in alone])[REPEATED])
 
 
 def test_readings_that_all_differ_are_all_asked() -> None:
@@ -56,7 +59,7 @@ def test_readings_that_all_differ_are_all_asked() -> None:
 
 def test_a_graph_asks_about_all_of_them() -> None:
     behaviour = minds(space(300))["low"]
-    rows = readings(3)
+    rows = distinct()[REPEATED]
     compiled: Any = torch.compile(behaviour, fullgraph=True, backend="aot_eager")
     whole, graph = behaviour(rows), compiled(rows)
     assert all(same_bits(a, b) for a, b in zip(graph[:4], whole[:4], strict=True))

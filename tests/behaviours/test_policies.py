@@ -1,6 +1,7 @@
 """Bundle and Priority give what their definitions say, computed by hand."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -28,6 +29,10 @@ def three(dim: int = 1000, vsa: str = "MAP-C", each: int = 8) -> tuple[Behaviour
     return bank, pairs
 
 
+taught = cache(three)
+"""The same for all examples of a test, which leave it as it is."""
+
+
 def everything(pairs: dict[str, Demonstrations]) -> torch.Tensor:
     """All conditions, and some that nobody was shown."""
     return torch.cat([*(p.sensors for p in pairs.values()), random_pairs(20, seed=9).sensors])
@@ -41,7 +46,7 @@ def same_answer(a: Recall, b: Recall) -> bool:
 @given(weights=st.lists(st.integers(-9, 9), min_size=3, max_size=3).filter(any), seed=st.integers(0, 99))
 def test_bundling_is_voting(weights: list[int], seed: int) -> None:
     """<c ⊗ Σ wᵢpᵢ, A> = Σ wᵢ <c ⊗ pᵢ, A>, exactly."""
-    bank, _ = three(128)
+    bank, _ = taught(128)
     policy = Bundle(bank, dict(zip(NAMES, weights, strict=True)))
     rng = np.random.default_rng(seed)
     condition, answer = (2 * rng.integers(0, 2, (2, 128)) - 1).astype(np.int64)
@@ -55,7 +60,7 @@ def test_bundling_is_voting(weights: list[int], seed: int) -> None:
 @given(weights=st.lists(st.floats(-3, 3), min_size=3, max_size=3).filter(lambda w: max(map(abs, w)) > 1e-9))
 @pytest.mark.parametrize("vsa", ARCHITECTURES)
 def test_bundling_is_voting_for_any_weights(vsa: str, weights: list[float]) -> None:
-    bank, _ = three(128, vsa, each=3)
+    bank, _ = taught(128, vsa, each=3)
     policy = Bundle(bank, dict(zip(NAMES, weights, strict=True)))
     wanted = sum(w * wide(bank[name].program) for w, name in zip(weights, NAMES, strict=True))
     np.testing.assert_allclose(wide(policy.program), wanted, atol=1e-5)
@@ -128,7 +133,7 @@ def test_one_behaviour_alone_is_that_behaviour(policy: type[Bundle | Priority]) 
 @settings(max_examples=40, deadline=None, derandomize=True)
 @given(weights=st.lists(st.integers(-2, 3), min_size=3, max_size=3).filter(any))
 def test_the_speaker_contributes_most_to_the_winner(weights: list[int]) -> None:
-    bank, pairs = three(64, each=4)
+    bank, pairs = taught(64, each=4)
     policy = Bundle(bank, dict(zip(NAMES, weights, strict=True)))
     readings = everything(pairs)
     recall = policy(readings)
@@ -155,7 +160,7 @@ def by_hand(policy: Priority, row: int, recalls: list[Recall]) -> int:
     thresholds=st.dictionaries(st.sampled_from(NAMES), st.sampled_from([-1.0, 0.0, 0.1, 0.3, 1.0])),
 )
 def test_priority_by_hand(order: list[str], take: int, thresholds: dict[str, float]) -> None:
-    bank, pairs = three(256, each=4)
+    bank, pairs = taught(256, each=4)
     order = order[:take]
     thresholds = {name: value for name, value in thresholds.items() if name in order}
     policy = Priority(bank, order, thresholds)

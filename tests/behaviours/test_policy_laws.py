@@ -15,15 +15,22 @@ from torchvsa.encoders import History, RandomFourier
 Make = Callable[[BehaviourBank], Policy]
 
 policies = pytest.mark.parametrize("make", POLICIES.values(), ids=POLICIES.keys())
-combinations = pytest.mark.parametrize(
-    ("make", "vsa"),
-    [
-        pytest.param(make, vsa, id=f"{name}-{vsa}")
-        for name, make in POLICIES.items()
-        for vsa in ARCHITECTURES
-        if not isinstance(make, type) or make.supports(torchvsa.architecture(vsa, 8))
-    ],
-)
+COMBINATIONS = [
+    pytest.param(make, vsa, id=f"{name}-{vsa}")
+    for name, make in POLICIES.items()
+    for vsa in ARCHITECTURES
+    if not isinstance(make, type) or make.supports(torchvsa.architecture(vsa, 8))
+]
+combinations = pytest.mark.parametrize(("make", "vsa"), COMBINATIONS)
+# Each policy in two architectures, of which one is no MAP, and each architecture with several policies: the laws take
+# seconds, and answers in every combination are tested below.
+SOME = [
+    combination
+    for turn, name in enumerate(POLICIES)
+    for place, vsa in enumerate(ARCHITECTURES)
+    for combination in COMBINATIONS
+    if combination.id == f"{name}-{vsa}" and place % 3 == turn % 3
+]
 
 
 def bank(vsa: str = "MAP-C", dim: int = 2000) -> BehaviourBank:
@@ -39,7 +46,7 @@ def parts(recall: Recall) -> list[torch.Tensor]:
     return [recall.commands, recall.similarity, recall.margin, recall.familiarity, recall.speaker]
 
 
-@combinations
+@pytest.mark.parametrize(("make", "vsa"), SOME)
 def test_every_policy_keeps_the_laws(make: Make, vsa: str) -> None:
     check_policy(make, space(1000, vsa, protection={"name": "self_shift", "width": "sum"}))
 
@@ -62,7 +69,8 @@ def test_their_options_keep_the_laws(make: Make) -> None:
     check_policy(or_refuse)
 
 
-@policies
+# Half of them, with and without a memory of their own: all ask the same space.
+@pytest.mark.parametrize("make", list(POLICIES.values())[::2], ids=list(POLICIES)[::2])
 def test_they_keep_the_laws_over_a_memory_of_continuous_readings(make: Make) -> None:
     check_policy(make, Space(SCHEMA, History(RandomFourier(MAP(1000), 3), [1])))
 

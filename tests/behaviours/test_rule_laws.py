@@ -40,8 +40,11 @@ def quick(name: str) -> Rule:
     return Gradient(epochs=15) if name == "gradient" else RULES.find(name)()
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
-@rules
+# Each rule in half of the architectures; in all of them it learns and recalls in the tests below.
+@pytest.mark.parametrize(
+    ("rule", "vsa"),
+    [(rule, vsa) for turn, rule in enumerate(RULES) for vsa in list(ARCHITECTURES)[(turn + turn // 2) % 2 :: 2]],
+)
 def test_every_rule_keeps_the_laws(rule: str, vsa: str) -> None:
     check_rule(quick(rule), space(500, vsa, protection={"name": "self_shift", "width": "sum"}))
 

@@ -1,26 +1,44 @@
-"""Run the real commands as a user would, in a folder outside the checkout."""
+"""Run the real commands as a user would type them, in a folder outside the checkout."""
 
+import contextlib
+import fcntl
+import io
 import json
-import subprocess
+import os
+import shutil
 import sys
+import tempfile
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from experiments.main import main
 
-SMALL = (
-    "demonstrations=6", "starts=6", "other_starts=4", "wheeled_starts=2", "validation_starts=2", "seconds=20",
-    "vsa.dim=1000",
-)  # fmt: skip
-"""A job of seconds instead of minutes; what it shows is not meant to be good."""
-
 
 def output_of(folder: Path, study: str, *overrides: str) -> str:
-    """What the command of a study prints in `folder`; it must not fail."""
-    command = [sys.executable, "-m", "experiments", study, *overrides]
-    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=500)
-    assert run.returncode == 0, run.stderr
-    return run.stdout
+    """What the command of a study prints in `folder`; it must not fail.
+
+    It runs in this process, which has imported already what a process of its own would import anew. That the command
+    starts by itself is for `test_packaging` and `test_kit_command`.
+    """
+    printed = io.StringIO()
+    with contextlib.chdir(folder), patch.object(sys, "argv", ["torchvsa"]), contextlib.redirect_stdout(printed):
+        main([study, *overrides])
+    return printed.getvalue()
+
+
+def shared_output_of(folder: Path, study: str, *overrides: str) -> str:
+    """The same of a run that all processes of the tests share: the first to need it makes it, each gets a copy."""
+    of_tests = os.environ.get("PYTEST_XDIST_TESTRUNUID", str(os.getpid()))
+    made = Path(tempfile.gettempdir(), f"torchvsa-tests-{of_tests}-{study}")
+    with made.with_suffix(".lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        printed = made / "printed.txt"
+        if not printed.exists():
+            made.mkdir()
+            printed.write_text(output_of(made, study, *overrides))
+    shutil.copytree(made / "outputs", folder / "outputs")
+    return printed.read_text()
 
 
 def only(folder: Path, name: str) -> Path:

@@ -9,7 +9,7 @@ import pandas as pd
 import pyarrow.parquet as pq
 import pytest
 import torch
-from commands import SMALL, only, output_of, results
+from commands import only, output_of, results, shared_output_of
 from small_run import full_run, settings, small_run
 
 from behaviours import BehaviourBank, Demonstrations
@@ -17,6 +17,11 @@ from experiments.corral import study
 from experiments.corral.tables import NUMBERS
 from experiments.kit import Outcome, Row
 
+SMALL = (
+    "demonstrations=6", "starts=6", "other_starts=4", "wheeled_starts=2", "validation_starts=2", "seconds=20",
+    "vsa.dim=1000",
+)  # fmt: skip
+"""A job of seconds instead of minutes; what it shows is not meant to be good."""
 ROWS = "controllers=[teacher,default,paper,paper_best_bins,bundled,hand_written,nearest_neighbour,random]"
 
 
@@ -24,7 +29,7 @@ ROWS = "controllers=[teacher,default,paper,paper_best_bins,bundled,hand_written,
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     """A small run of most rows: its folder and what the terminal showed."""
     folder = tmp_path_factory.mktemp("run")
-    return folder, output_of(folder, "corral", *SMALL, ROWS, "paper_bins=[2]")
+    return folder, shared_output_of(folder, "corral", *SMALL, ROWS, "paper_bins=[2]", "workers=1")
 
 
 def episodes(folder: Path) -> list[Row]:
@@ -97,8 +102,8 @@ def test_what_was_learned_is_kept_and_can_be_learned_again(finished: tuple[Path,
     demonstrations = Demonstrations.load(shown)
     assert len(demonstrations.episodes.unique()) == 6
     shutil.copy(shown, tmp_path / "shown.safetensors")
-    own = ("demonstrations_file=shown.safetensors", "controllers=[default]", "animate=false", "workers=1")
-    output_of(tmp_path, "corral", *SMALL, *own)
+    own = ("demonstrations_file=shown.safetensors", "controllers=[default]", "animate=false", "vsa.dim=1000")
+    output_of(tmp_path, "corral", *own, "starts=1", "validation_starts=1", "seconds=2", "workers=1")
     again = BehaviourBank.load(only(tmp_path, "behaviours.safetensors"))
     assert torch.equal(again["default"].program, bank["default"].program)
     agreed = bank["default"](demonstrations.sensors).commands == demonstrations.commands

@@ -13,7 +13,7 @@ from experiments.kit.run import run
 
 
 def test_both_engines_drive_from_the_same_starts(tmp_path: Path) -> None:
-    settings = composed(study, "arenas=[default,two_lamps]", "controllers=[teacher,default]", "starts=4", "seconds=20",
+    settings = composed(study, "arenas=[default,two_lamps]", "controllers=[teacher,default]", "starts=4", "seconds=10",
                         "demonstrations=3", "vsa.dim=256", "workers=1")  # fmt: skip
     outcome = run(study, settings, tmp_path, Console(quiet=True))
     driven = set(zip(outcome.records.arena, outcome.records.controller, outcome.records.engine, strict=True))

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pyarrow.parquet as pq
 import pytest
-from commands import drawn_again, only, output_of, results
+from commands import drawn_again, only, results, shared_output_of
 from kits import composed
 from rich.console import Console
 
@@ -157,7 +157,7 @@ def test_wrong_settings_are_named(override: str, words: str) -> None:
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("generalisation")
-    return folder, output_of(folder, "generalisation", *TINY, "workers=2")
+    return folder, shared_output_of(folder, "generalisation", *TINY)
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:

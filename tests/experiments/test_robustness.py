@@ -7,7 +7,7 @@ from typing import Any, cast
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
-from commands import only, output_of, results
+from commands import only, results, shared_output_of
 from kits import composed
 from rich.console import Console
 
@@ -103,7 +103,7 @@ TINY = (
 @pytest.fixture(scope="module")
 def finished(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     folder = tmp_path_factory.mktemp("robustness")
-    return folder, output_of(folder, "robustness", *TINY)
+    return folder, shared_output_of(folder, "robustness", *TINY)
 
 
 def test_the_command_writes_table_records_and_page(finished: tuple[Path, str]) -> None:

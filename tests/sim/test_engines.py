@@ -108,9 +108,9 @@ def test_rotations_are_sines_and_cosines(angle: float) -> None:
 
 
 def test_a_robot_keeps_its_bits_at_any_place_of_any_batch() -> None:
-    whole = sim.rollout(sim.Teacher(), episodes=range(300), seconds=15.0)
-    for episodes, robots in ((range(299, -1, -1), 7), (range(100, 133), 1000)):
-        part = sim.rollout(sim.Teacher(), episodes=episodes, seconds=15.0, robots=robots)
+    whole = sim.rollout(sim.Teacher(), episodes=range(300), seconds=8.0)
+    for episodes, robots in ((range(132, 99, -1), 7), (range(100, 133), 1000)):
+        part = sim.rollout(sim.Teacher(), episodes=episodes, seconds=8.0, robots=robots)
         for episode in (100, 117, 131):
             one, other = whole.slice(episode), part.slice(episode)
             assert one.x.tobytes() == other.x.tobytes()

@@ -29,10 +29,17 @@ def teacher() -> Rollout:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("engine", "body"), [("vector", "planar"), ("bullet", "planar"), ("bullet", "wheeled")])
-@pytest.mark.parametrize("policy", [sim.Teacher(), policies.random])
+@pytest.mark.parametrize(
+    ("engine", "body", "policy"),
+    [
+        ("vector", "planar", sim.Teacher()),
+        ("vector", "planar", policies.random),
+        ("bullet", "planar", policies.random),
+        ("bullet", "wheeled", sim.Teacher()),
+    ],
+)
 def test_batch_size_and_order_change_no_bit(engine: str, body: str, policy: sim.ControllerLike) -> None:
-    run: dict[str, Any] = {"engine": engine, "body": body, "seed": 4, "seconds": 12.0}
+    run: dict[str, Any] = {"engine": engine, "body": body, "seed": 4, "seconds": 6.0}
     alone = sim.rollout(policy, episodes=range(5), robots=1, **run)
     assert equal(alone, sim.rollout(policy, episodes=range(5), robots=1, **run))
     assert equal(alone, sim.rollout(policy, episodes=range(5), robots=16, **run))
@@ -251,7 +258,7 @@ def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
 @pytest.mark.slow
 def test_the_teacher_solves_the_default_arena_on_both_bodies_and_chance_does_not() -> None:
     planar = sim.rollout(sim.Teacher(), episodes=range(1000, 1060)).summary()
-    wheeled = sim.rollout(sim.Teacher(), engine="bullet", body="wheeled", episodes=range(1000, 1060)).summary()
+    wheeled = sim.rollout(sim.Teacher(), engine="bullet", body="wheeled", episodes=range(1000, 1030)).summary()
     chance = sim.rollout(policies.random, episodes=range(1000, 1020), record=False).summary()
     assert planar.success_rate >= 0.97
     assert abs(planar.success_rate - wheeled.success_rate) <= 0.05

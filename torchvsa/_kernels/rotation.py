@@ -17,8 +17,9 @@ def rotate(x: Shaped[Tensor, "*#batch d"], shifts: Int[Tensor, "*#batch"]) -> Sh
     """Rotate each row to the right by its shift; rows and shifts broadcast."""
     dim = x.shape[-1]
     if shifts.shape != x.shape[:-1]:
-        batch = torch.broadcast_shapes(x.shape[:-1], shifts.shape)
-        x, shifts = x.expand(*batch, dim), shifts.expand(batch)
+        # `torch.broadcast_shapes` would import the symbolic shapes of compilers, which takes a second.
+        shifts = torch.broadcast_tensors(x[..., 0], shifts)[1]
+        x = x.expand(*shifts.shape, dim)
     # Small types cannot hold every shift up to d, and no type the negative of its lowest number.
     starts = (-shifts.to(torch.int64).remainder(dim)).remainder(dim)
     # Each row is written twice, read and written again: 4 copies.
