@@ -26,6 +26,8 @@ DISTINCT = 128
 """Behaviours among which no condition is shared."""
 MARGIN = 5.0
 """In units of a stored pair, as in `ErrorDriven`."""
+CACHED = 500_000
+"""Elements of programs that are trained side by side; 2 MB."""
 POOL = 60
 """Conditions from which all behaviours of a contradicting bank draw theirs."""
 
@@ -52,6 +54,10 @@ class EncodedPairs:
         made = space(dim, codebook)
         conditions = torch.stack([made.encode(column) for column in cells.unbind(1)])
         return cls(cells, results, conditions, made.items(torch.arange(RESULTS)[:, None]).to(torch.float32))
+
+    def some(self, chosen: slice) -> EncodedPairs:
+        """The pairs of some of the behaviours."""
+        return EncodedPairs(self.cells[chosen], self.results[chosen], self.conditions[:, chosen], self.items)
 
 
 def space(dim: int, codebook: int) -> Space:
@@ -94,7 +100,14 @@ def one_shot(shown: EncodedPairs) -> Float[Tensor, "b d"]:
 
 
 def trained(shown: EncodedPairs, margin: float = MARGIN, epochs: int = 200) -> Float[Tensor, "b d"]:
-    """The programs of `ErrorDriven(margin)`, all behaviours trained at once."""
+    """The programs of `ErrorDriven(margin)`, several behaviours trained at once: as many as fit into a cache."""
+    count, size = len(shown.cells), max(1, CACHED // shown.items.shape[1])
+    return torch.cat(
+        [_trained(shown.some(slice(first, first + size)), margin, epochs) for first in range(0, count, size)]
+    )
+
+
+def _trained(shown: EncodedPairs, margin: float, epochs: int) -> Float[Tensor, "b d"]:
     dim = shown.items.shape[1]
     programs = torch.zeros(shown.conditions.shape[1:])
     rows = torch.arange(len(programs))
@@ -121,7 +134,8 @@ def trained(shown: EncodedPairs, margin: float = MARGIN, epochs: int = 200) -> F
 
 def scores(shown: EncodedPairs, asked: Float[Tensor, "b d"]) -> Float[Tensor, "b k r"]:
     """The scores of all results for each behaviour's conditions, asked of one vector per behaviour."""
-    return torch.stack([(asked * conditions) @ shown.items.T for conditions in shown.conditions], 1)
+    each = zip(shown.conditions.unbind(1), asked, strict=True)
+    return torch.stack([conditions.to(torch.float32) @ (vector * shown.items).T for conditions, vector in each])
 
 
 def together(
