@@ -26,8 +26,11 @@ def operations(outcome: Outcome) -> Figure:
     across = min(len(panels), 2)
     down = -(-len(panels) // across)
     figure = Figure(figsize=(4.6 * across, 3.6 * down), layout="constrained")
-    for draw, axes in zip(panels, figure.subplots(down, across, squeeze=False).flat, strict=False):
-        draw(axes)
+    for place, axes in enumerate(figure.subplots(down, across, squeeze=False).flat):
+        if place < len(panels):
+            panels[place](axes)
+        else:
+            axes.set_axis_off()
     return figure
 
 
@@ -39,6 +42,7 @@ def recognition(axes: Axes, outcome: Outcome) -> None:
     axes.axhline(1 / len(outcome.settings.behaviours), color=GREY, linestyle=":", linewidth=1, label="chance")
     axes.set_xscale("log")
     axes.set_xticks(rows.steps, [str(steps) for steps in rows.steps])
+    axes.minorticks_off()
     axes.set(title="recognition", xlabel="steps seen", ylabel="share recognised", ylim=(0, 1.02))
     axes.legend()
 

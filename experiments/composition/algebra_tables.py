@@ -55,7 +55,8 @@ def distances(own: pd.DataFrame) -> list[Row]:
 
 def switched(own: pd.DataFrame) -> list[Row]:
     """The weights of each codebook."""
-    rows: Any = own[["codebook", "readings_apart", "measured", "predicted"]].to_dict("records")
+    numbers: Any = own[["codebook", "readings_apart", "measured", "predicted"]]
+    rows: list[Row] = numbers.to_dict("records")
     for row in rows:
         row |= {name: int(row[name]) for name in ("codebook", "readings_apart")}
         row["error"] = abs(row["measured"] - row["predicted"])

@@ -8,11 +8,14 @@ import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
 
-from experiments.composition.interference_tables import WHO
-from experiments.composition.sums import KNOWERS
+from experiments.composition.interference_tables import HOWS, WHO
+from experiments.composition.sums import ANYWHERE, KNOWERS, SHARED
 from experiments.kit import Outcome
 from experiments.kit.figures import BLACK, BLUE, GREEN, GREY, ORANGE, PALETTE, VERMILION, legend_below
 
+SAMPLES = {ANYWHERE: "samples of any moments", SHARED: "samples of shared conditions"}
+REFERENCES = {("error_driven_5", "joint"): "-", ("evident", "silent_sum"): "--"}
+"""Rows of the table of rules that are drawn beside repaired sums, and their lines."""
 COLOURS: dict[str, str] = dict(zip(KNOWERS, (VERMILION, BLUE, ORANGE, GREEN), strict=True))
 
 
@@ -21,51 +24,51 @@ def reason(outcome: Outcome) -> Figure:
     records = outcome.records
     own: Any = records.loc[records.part == "reason"]
     kinds = [who for who in KNOWERS if (own.knowers == who).any()][:3]
-    figure = Figure(figsize=(3.6 * len(kinds), 3.9), layout="constrained")
+    added, weights = own.rival + own.bystander, own["count"]
+    figure = Figure(figsize=(3.8 * len(kinds), 4.0), layout="constrained")
     for axes, who in zip(
         figure.subplots(1, len(kinds), sharex=True, sharey=True, squeeze=False)[0], kinds, strict=True
     ):
-        part = own.loc[own.knowers == who]
-        size = 2 + 60 * np.sqrt(part["count"] / own["count"].max())
-        axes.scatter(part.own, part.rival + part.bystander, s=size, color=COLOURS[who], alpha=0.25, lw=0)
-        low, high = axes.get_xlim()
+        here = own.knowers == who
+        size = 3 + 60 * np.sqrt(weights[here] / weights.max())
+        axes.scatter(own.own[here], added[here], s=size, color=COLOURS[who], alpha=0.25, lw=0)
         axes.axline((0, 0), slope=-1, color=BLACK, linewidth=1)
-        axes.set_xlim(low, high)
-        wrong = np.average(~part.right.astype(bool), weights=part["count"])
-        share = part["count"].sum() / own["count"].sum()
-        axes.set_title(f"{WHO[who]}\n{share:.1%} of the moments, {wrong:.1%} of them wrong")
+        wrong, share = (
+            np.average(~own.right[here].astype(bool), weights=weights[here]),
+            weights[here].sum() / weights.sum(),
+        )
+        axes.set_title(f"{WHO[who]}\n{share:.1%} of the moments,\n{wrong:.1%} of these wrong")
         axes.set_xlabel("lead in the right program")
+        axes.set_xlim(min(own.own.min(), 0) - 0.5, own.own.quantile(0.99) + 1)
+        axes.set_ylim(added.min() - 0.5, added.quantile(0.99) + 1)
     figure.axes[0].set_ylabel("lead added by the others")
     return figure
 
 
 def repair(outcome: Outcome) -> Figure:
     """Agreement against the number of joint samples, of all moments and of those in which the teacher avoids."""
-    frame = pd.DataFrame([row for row in outcome.table if row["part"] == "repair"])
+    frame = pd.DataFrame([row for row in outcome.table if row["part"] == "repair"]).sort_values("joint")
     rules = {(row["learner"], row["how"]): row for row in outcome.table if row["part"] == "rules"}
-    figure = Figure(figsize=(10, 4.2), layout="constrained")
+    counts = sorted(frame.joint.unique())
+    figure = Figure(figsize=(10, 4.4), layout="constrained")
     panels = figure.subplots(1, 2)
-    for axes, column, title in zip(
-        panels, ("agreement", "agreement_avoid"), ("all moments", "where the teacher avoids"), strict=True
-    ):
-        ways = frame[["repair", "source"]].drop_duplicates().to_numpy().tolist()
+    columns = {"agreement": "all moments", "agreement_avoid": "where the teacher avoids"}
+    for axes, (column, title) in zip(panels, columns.items(), strict=True):
+        ways = [(name, source) for name in outcome.settings.repairs for source in outcome.settings.sources]
         for (name, source), colour in zip(ways, PALETTE, strict=False):
-            rows = frame.loc[(frame.repair == name) & (frame.source == source)].sort_values("joint")
-            axes.plot(rows.joint, rows[column], "o-", color=colour, markersize=4, label=f"{name}, from {source}")
+            rows = frame.loc[(frame.repair == name) & (frame.source == source)]
+            place = [counts.index(count) for count in rows.joint]
+            axes.plot(place, rows[column], "o-", color=colour, markersize=4, label=f"{name}, {SAMPLES[source]}")
             low, high = rows[f"{column}_codebook_low"].astype(float), rows[f"{column}_codebook_high"].astype(float)
-            axes.fill_between(rows.joint, low, high, color=colour, alpha=0.12, linewidth=0)
-        for (learner, how), style in (
-            (("error_driven_5", "joint"), "-"), (("evident", "silent_sum"), "--"), (("evident", "sum"), ":"),
-        ):  # fmt: skip
+            axes.fill_between(place, low, high, color=colour, alpha=0.12, linewidth=0)
+        for (learner, how), style in REFERENCES.items():
             if (learner, how) in rules:
-                label = f"{learner}, {how.replace('_', ' ')}"
+                label = f"{learner}, {HOWS[how]}"
                 axes.axhline(rules[learner, how][column], color=GREY, linestyle=style, linewidth=1.2, label=label)
-        axes.set_xscale("symlog", linthresh=1)
-        axes.set_xticks(sorted(frame.joint.unique()), [str(count) for count in sorted(frame.joint.unique())])
-        axes.minorticks_off()
+        axes.set_xticks(range(len(counts)), [str(count) for count in counts])
         axes.set(title=title, xlabel="joint samples")
     panels[0].set_ylabel("agreement with the teacher")
-    legend_below(figure, panels[0], 4)
+    legend_below(figure, panels[0], 2)
     return figure
 
 

@@ -219,8 +219,8 @@ study = Study(
     figures=[
         Drawing(
             "scale", scale_figures.recall, "recall against the number of behaviours, a colour for each dimension",
-            "Points are measured, lines predicted. Beyond the dotted line there are more pairs than conditions, so "
-            "that bundled behaviours contradict each other.",
+            "Points are measured, lines predicted (solid: superposed once; dotted: trained). Beyond the vertical line "
+            "there are more pairs than conditions, so that bundled behaviours contradict each other.",
         ),
         Drawing(
             "contradictions", scale_figures.contradictions,
