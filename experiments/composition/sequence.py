@@ -69,9 +69,8 @@ def check(settings: Sequence) -> None:
 
 
 def cells(settings: Sequence) -> list[Cell]:
-    """A cell for each arena, engine and codebook, and one for the teacher (codebook null); the slow engine first."""
-    engines = ["bullet", "vector"] if settings.bullet_starts else ["vector"]
-    return grid(engine=engines, arena=settings.arenas, codebook=[None, *range(settings.codebooks)])
+    """A cell for each arena and codebook, and one for the teacher (codebook null)."""
+    return grid(arena=settings.arenas, codebook=[None, *range(settings.codebooks)])
 
 
 @dataclass(frozen=True)
@@ -104,40 +103,47 @@ def prepare(settings: Sequence, folder: Path, progress: Any) -> Material:
 
 
 def measure(material: Material, cell: Cell) -> list[Row]:
-    """For each start, whether the robot touches the blue lamp and then stays at the yellow one.
+    """For each engine and start, whether the robot touches the blue lamp and then stays at the yellow one.
 
     `agreement`, the same in all rows of a codebook, is the share of held-out moments in which 'to yellow' commands what
     the teacher does.
     """
     settings, arena, codebook = material.settings, cell["arena"], cell["codebook"]
-    starts = np.arange(settings.bullet_starts if cell["engine"] == "bullet" else settings.starts)
-    keep = cell["engine"] == "vector" and codebook == 0
-    agreement = None
     if codebook is None:
-        controller: Any = sim.InOrder(task.TASK)
-    else:
-        taught, seed = material.taught[arena], MOST_CODEBOOKS * settings.seed + codebook
-        starts = np.array_split(starts, settings.codebooks)[codebook]
-        with no_convergence_warnings():
-            both = task.bank(task.space(settings.dim, settings.bins, seed), taught, ErrorDriven(settings.margin))
-            controller = task.policy(both, taught, ErrorDriven(settings.switching_margin), seed)
-        if cell["engine"] == "vector":
-            agreement = share_right(both["to yellow"], material.asked[arena])
-    driven = sim.rollout(
-        controller, arena, task=task.TASK, episodes=starts.tolist(), seed=settings.seed, seconds=settings.seconds,
-        engine=cell["engine"], record=keep,
-    )  # fmt: skip
-    if keep:
-        sequence_paths.write(material.folder, arena, controller, driven)
-    row = TEACHER if codebook is None else VECTOR
-    found = zip(driven.episode.tolist(), driven.success.tolist(), strict=True)
-    return [{"row": row, "episode": start, "success": good, "agreement": agreement} for start, good in found]
+        return drive(settings, arena, sim.InOrder(task.TASK))
+    taught, seed = material.taught[arena], MOST_CODEBOOKS * settings.seed + codebook
+    with no_convergence_warnings():
+        both = task.bank(task.space(settings.dim, settings.bins, seed), taught, ErrorDriven(settings.margin))
+        policy = task.policy(both, taught, ErrorDriven(settings.switching_margin), seed)
+    if codebook == 0:
+        sequence_paths.write(material.folder, arena, policy, settings.seed, settings.seconds)
+    agreement = share_right(both["to yellow"], material.asked[arena])
+    rows = drive(settings, arena, task.AskedOnce(policy), codebook)
+    return [{**row, "agreement": agreement} for row in rows]
+
+
+def drive(settings: Sequence, arena: str, controller: sim.ControllerLike, codebook: int | None = None) -> list[Row]:
+    """A row for each engine and start, of all or of those of one codebook."""
+    rows = []
+    for engine, count in (("vector", settings.starts), ("bullet", settings.bullet_starts)):
+        if count:
+            chosen = (
+                np.arange(count) if codebook is None else np.array_split(np.arange(count), settings.codebooks)[codebook]
+            )
+            driven = sim.rollout(
+                controller, arena, task=task.TASK, episodes=chosen.tolist(), seed=settings.seed,
+                seconds=settings.seconds, engine=engine, record=False,
+            )  # fmt: skip
+            for start, success in zip(driven.episode.tolist(), driven.success.tolist(), strict=True):
+                row = TEACHER if codebook is None else VECTOR
+                rows.append({"engine": engine, "row": row, "episode": start, "success": success})
+    return rows
 
 
 def summarise(settings: Sequence, records: pd.DataFrame) -> list[Row]:
     """A row for each arena, engine and controller; the last one counts only starts where the teacher succeeds."""
     table: list[Row] = []
-    for cell in grid(arena=settings.arenas, engine=list(records.engine.unique())[::-1]):
+    for cell in grid(arena=settings.arenas, engine=records.engine.unique()):
         here = records.loc[(records.arena == cell["arena"]) & (records.engine == cell["engine"])]
         rows = {name: here.loc[here.row == name].set_index("episode") for name in (TEACHER, VECTOR)}
         solved = rows[TEACHER].index[rows[TEACHER].success]

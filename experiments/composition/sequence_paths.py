@@ -13,7 +13,7 @@ from behaviours import Sequencing
 from experiments.kit import Outcome
 from experiments.kit.figures import BLUE, ORANGE, VERMILION
 from experiments.kit.store import write_frame
-from experiments.tasks.two_lamps import speakers
+from experiments.tasks.two_lamps import TASK, AskedOnce, speakers
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,13 +23,15 @@ PATHS = 6
 SPEAKERS = {"to blue": BLUE, "to yellow": ORANGE}
 
 
-def write(folder: Path, arena: str, policy: Sequencing, driven: sim.Rollout) -> None:
-    """Keep paths with the behaviour that speaks at each step."""
-    steps, episode = driven.trajectory, driven.step_episode
-    columns = {"episode": episode, "x": steps.x, "y": steps.y, "speaker": speakers(policy, driven)}
-    paths = pd.DataFrame(columns)
+def write(folder: Path, arena: str, policy: Sequencing, seed: int, seconds: float) -> None:
+    """Drive from the first starts, and keep the paths with the behaviour that speaks at each step."""
+    driven = sim.rollout(AskedOnce(policy), arena, task=TASK, episodes=range(PATHS), seed=seed, seconds=seconds)
+    steps = driven.trajectory
+    columns = {"x": steps.x, "y": steps.y, "speaker": speakers(policy, driven)}
+    success = np.repeat(driven.success, np.diff(driven.offsets))
+    paths = pd.DataFrame({"episode": driven.step_episode, "success": success, **columns})
     (folder / "paths").mkdir(exist_ok=True)
-    write_frame(folder / "paths" / f"{arena}.parquet", paths.loc[paths.episode < PATHS])
+    write_frame(folder / "paths" / f"{arena}.parquet", paths)
 
 
 def draw(outcome: Outcome) -> Figure:
@@ -40,19 +42,17 @@ def draw(outcome: Outcome) -> Figure:
 
     from sim import render
 
-    arenas, records = outcome.settings.arenas, outcome.records
+    arenas = outcome.settings.arenas
     figure = Figure(figsize=(4.6 * len(arenas), 4.7), layout="constrained")
     for axes, arena in zip(figure.subplots(1, len(arenas), squeeze=False)[0], arenas, strict=True):
         render.draw_corral(axes, sim.find_arena(arena))
-        own = records.loc[(records.arena == arena) & (records.engine == "vector") & records.agreement.notna()]
-        success = dict(zip(own.episode, own.success, strict=True))
-        for episode, path in pd.read_parquet(outcome.folder / "paths" / f"{arena}.parquet").groupby("episode"):
+        for _, path in pd.read_parquet(outcome.folder / "paths" / f"{arena}.parquet").groupby("episode"):
             points = path[["x", "y"]].to_numpy()
             pieces = np.stack([points[:-1], points[1:]], axis=1)
             colours = [SPEAKERS[name] for name in path.speaker[:-1]]
             axes.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.3, zorder=3))
             axes.plot(*points[0], "o", markersize=5, markerfacecolor="white", markeredgecolor="black", zorder=5)
-            if not success[episode]:
+            if not path.success.iloc[0]:
                 axes.plot(*points[-1], "X", markersize=8, color=VERMILION, zorder=6)
         axes.set_title(arena)
         axes.set_axis_off()

@@ -73,21 +73,50 @@ def policy(both: BehaviourBank, taught: Runs, switching: Rule, seed: int) -> Seq
     return Sequencing(both, transitions, switching, seed=seed)
 
 
-class Speakers:
-    """A controller that answers with the index of the behaviour that speaks, as `policy` goes along."""
+class AskedOnce:
+    """Drives as `policy` does, which is asked once about each condition that a robot meets with each behaviour.
+
+    The state per robot is the index of the behaviour that has the floor.
+    """
 
     def __init__(self, policy: Sequencing) -> None:
         self.policy = policy
-        self.start = policy.start
+        self._known: dict[bytes, tuple[NDArray[np.float64], int]] = {}
 
-    def step(self, readings: NDArray[np.float64], state: object) -> tuple[NDArray[np.float64], object]:
+    def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
+        """The first behaviour, for each robot."""
+        return np.zeros(len(episodes), dtype=np.int64)
+
+    def step(
+        self, readings: NDArray[np.float64], floor: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Commands `[B, 2]` for readings `[B, n]`, and the behaviour that speaks, which has the floor then."""
+        cells = self.policy.space.cells(readings).numpy()
+        keys = [row.tobytes() for row in np.concatenate([cells, floor[:, None]], 1)]
+        new = {key: place for place, key in enumerate(keys) if key not in self._known}
+        if new:
+            places = list(new.values())
+            past, _ = self.policy.start(places)
+            recall, _ = self.policy.step(readings[places], (past, torch.from_numpy(floor[places])))
+            assert recall.speaker is not None
+            answers = zip(recall.commands.numpy(), recall.speaker.tolist(), strict=True)
+            self._known.update(zip(new, answers, strict=True))
+        commands, speakers = zip(*(self._known[key] for key in keys), strict=True)
+        return np.stack(commands), np.array(speakers)
+
+
+class _Speakers(AskedOnce):
+    """Answers with the behaviour that speaks instead of commands."""
+
+    def step(
+        self, readings: NDArray[np.float64], floor: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """The speaker `[B, 1]` for readings `[B, n]`, and the next state."""
-        recall, after = self.policy.step(readings, state)
-        assert recall.speaker is not None
-        return recall.speaker[:, None].double().numpy(), after
+        _, after = super().step(readings, floor)
+        return after[:, None].astype(np.float64), after
 
 
 def speakers(policy: Sequencing, rollout: sim.Rollout) -> list[str]:
     """The name of the behaviour that speaks at each control step of recorded runs."""
-    index = sim.replay(Speakers(policy), rollout.trajectory.sensors, rollout.step_episode)[:, 0]
+    index = sim.replay(_Speakers(policy), rollout.trajectory.sensors, rollout.step_episode)[:, 0]
     return [policy.names[int(number)] for number in index]
