@@ -18,7 +18,7 @@ from experiments.tasks.two_lamps import TASK, AskedOnce, speakers
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-PATHS = 6
+PATHS = 4
 """Paths that are kept for the page."""
 SPEAKERS = {"to blue": BLUE, "to yellow": ORANGE}
 

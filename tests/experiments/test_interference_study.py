@@ -31,16 +31,18 @@ def given() -> sums.Material:
 
 
 def test_all_parts_are_measured(tmp_path: Path) -> None:
-    settings = composed(study, *SMALL, "rows=[one_shot,error_driven_5]", "joint=[0,3,20]", "draws=1")
+    settings = composed(
+        study, *SMALL, "rows=[one_shot,error_driven_1]", "rule.margin=1.0", "joint=[0,20]", "draws=1", "codebooks=1"
+    )
     outcome = run(study, settings, tmp_path, Console(quiet=True))
     rules = {(row["learner"], row["how"]): row for row in outcome.table if row["part"] == "rules"}
     assert list(rules) == [
         ("one_shot", "sum"), ("one_shot", "joint"),
-        ("error_driven_5", "sum"), ("error_driven_5", "joint"), ("error_driven_5", "silent_sum"),
+        ("error_driven_1", "sum"), ("error_driven_1", "joint"), ("error_driven_1", "silent_sum"),
     ]  # fmt: skip
     repairs = {(row["repair"], row["source"], row["joint"]): row for row in outcome.table if row["part"] == "repair"}
-    assert len(repairs) == 2 * 2 * 3
-    plain = rules["error_driven_5", "sum"]
+    assert len(repairs) == 2 * 2 * 2
+    plain = rules["error_driven_1", "sum"]
     for (_, _, joint), row in repairs.items():
         if joint == 0:
             assert row["agreement"] == plain["agreement"]

@@ -18,7 +18,7 @@ from experiments.tasks import two_lamps
 @pytest.mark.slow
 def test_a_robot_goes_to_the_lamp_that_was_never_demonstrated(tmp_path: Path) -> None:
     settings = composed(
-        study, "arenas=[lamp_room]", "codebooks=2", "starts=6", "bullet_starts=0", "heldout=10", "workers=1"
+        study, "arenas=[lamp_room]", "codebooks=2", "starts=6", "bullet_starts=0", "heldout=4", "workers=1"
     )
     outcome = run(study, settings, tmp_path, Console(quiet=True))
     rows = {row["row"]: row for row in outcome.table}
@@ -32,7 +32,7 @@ def test_a_robot_goes_to_the_lamp_that_was_never_demonstrated(tmp_path: Path) ->
     assert "| one_vector | lamp_room | vector | 6 | 1.000 [0.610, 1.000] |" in table.markdown()
     assert "100.0% of 6 starts" in study.headline(outcome)
     paths = pd.read_parquet(tmp_path / "paths" / "lamp_room.parquet")
-    assert paths.episode.unique().tolist() == [0, 1, 2, 3, 4, 5]
+    assert paths.episode.unique().tolist() == [0, 1, 2, 3]
     for _, path in paths.groupby("episode"):  # first to one lamp, then to the other
         spoken = [name for name, before in zip(path.speaker, [None, *path.speaker], strict=False) if name != before]
         assert spoken == ["to blue", "to yellow"]
