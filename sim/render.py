@@ -26,6 +26,7 @@ from sim.result import Rollout, Steps
 from sim.robot import CONTROL_HZ, RADIUS
 from sim.sensors import DISTANCE_MAX, LIGHT_MAX
 from sim.shapes import Box
+from sim.task import Task
 from sim.teachers import BEHAVIOURS, InOrder
 
 WALL, INK, PAPER = "#3d4654", "#22272f", "#ffffff"
@@ -121,16 +122,54 @@ def animate(
         raise ValueError(f"{len(rollouts)} rollouts and {len(titles)} titles; expected one title per rollout")
     if len({rollout.arena for rollout in rollouts}) > 1:
         raise ValueError("the rollouts are from different arenas; expected one arena")
+    chosen = _typical(rollouts) if episode is None else episode
+    panels = [
+        _Panel(rollout.slice(chosen), title, rollout.arena, rollout.task)
+        for rollout, title in zip(rollouts, titles, strict=True)
+    ]
+    return _write_gif(panels, Path(path), speed, frames)
+
+
+def animate_steps(
+    steps: Steps,
+    title: str,
+    path: str | os.PathLike[str],
+    arena: Arena,
+    speakers: Sequence[str],
+    task: Task | None = None,
+    speed: float = 2.0,
+    frames: int = 150,
+) -> Path:
+    """Write a GIF of the recorded steps of one episode, as `animate` does, with the behaviour that speaks at each.
+
+    Args:
+        steps: the control steps.
+        title: written above the picture.
+        path: the file to write; its folder must exist.
+        arena: where the robot drove.
+        speakers: a name for each step: what is written below the picture, and says the colour (see `COLOURS`).
+        task: says what the columns of the readings are; by default that of the arena.
+        speed: playback speed relative to real time.
+        frames: maximum number of frames.
+
+    Raises:
+        ValueError: not one speaker per step, no steps, or numbers out of range.
+    """
+    if len(steps) != len(speakers) or not len(steps):
+        raise ValueError(f"{len(steps)} steps and {len(speakers)} speakers; expected one speaker per step")
+    panel = _Panel(steps, title, arena, Task.of(arena) if task is None else task, speakers)
+    return _write_gif([panel], Path(path), speed, frames)
+
+
+def _write_gif(panels: Sequence[_Panel], path: Path, speed: float, frames: int) -> Path:
     if speed <= 0 or frames < 1:
         raise ValueError(f"speed={speed}, frames={frames}; expected a speed above 0 and at least 1 frame")
-    chosen = _typical(rollouts) if episode is None else episode
-    panels = [_Panel(rollout.slice(chosen), title, rollout) for rollout, title in zip(rollouts, titles, strict=True)]
     length = max(len(panel) for panel in panels)
     # Two control steps per frame look smooth. Viewers slow down a GIF with less than 20 ms per frame.
     stride = max(2, -(-length // frames), math.ceil(speed * 0.02 * CONTROL_HZ))
     ticks = [*range(0, length - 1, stride), length - 1]
     images = [_join([panel.frame(tick) for panel in panels], speed) for tick in ticks]
-    palette = _join([panel.frame(length - 1) for panel in panels], speed).quantize(128)
+    palette = images[-1].quantize(128)
     images = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
     delay = round(1000 * stride / CONTROL_HZ / speed)
     buffer = io.BytesIO()
@@ -138,7 +177,7 @@ def animate(
         buffer, "GIF", save_all=True, append_images=images[1:], loop=0, optimize=False,
         duration=[delay] * (len(images) - 1) + [1500],
     )  # fmt: skip
-    return _write(Path(path), buffer.getvalue())
+    return _write(path, buffer.getvalue())
 
 
 def _typical(rollouts: Sequence[Rollout]) -> int:
@@ -170,7 +209,7 @@ def _extent(arena: Arena) -> tuple[float, float, float, float]:
 
 
 _COLOUR_OF_RULE = {rule: COLOURS[name] for name, rules in BEHAVIOURS.items() for rule in rules}
-_BEHAVIOUR_OF_RULE = {rule: name.replace("_", " ") for name, rules in BEHAVIOURS.items() for rule in rules}
+_BEHAVIOUR_OF_RULE = {rule: name for name, rules in BEHAVIOURS.items() for rule in rules}
 (_AVOID,) = BEHAVIOURS["avoid"]
 
 
@@ -179,12 +218,16 @@ class _Panel:
 
     _WIDTH, _FINE, _HEAD, _FOOT = 400, 2, 34, 24
 
-    def __init__(self, path: Steps, title: str, rollout: Rollout) -> None:
-        self._path, arena = path, rollout.arena
+    def __init__(
+        self, path: Steps, title: str, arena: Arena, task: Task, speakers: Sequence[str] | None = None
+    ) -> None:
+        self._path = path
         self._title = title
-        teacher = InOrder(rollout.task)
-        self._rules = teacher.rule(path.sensors, path.goal).tolist()
-        self._lights = [rollout.task.pair(rollout.task.goals[goal]) for goal in path.goal.tolist()]
+        if speakers is None:
+            speakers = [_BEHAVIOUR_OF_RULE[rule] for rule in InOrder(task).rule(path.sensors, path.goal).tolist()]
+        self._speakers = list(speakers)
+        self._colours = [COLOURS.get(name, INK) for name in self._speakers]
+        self._lights = [task.pair(task.goals[goal]) for goal in path.goal.tolist()]
         left, right, bottom, top = _extent(arena)
         self._scale = self._WIDTH * self._FINE / (right - left)
         self._origin = left, top
@@ -216,8 +259,8 @@ class _Panel:
         pen = ImageDraw.Draw(self._trail)
         for i in range(self._drawn, tick):
             ends = [self._at(path.x[k], path.y[k]) for k in (i, i + 1)]
-            pen.line(ends, fill=_COLOUR_OF_RULE[self._rules[i]], width=2 * self._FINE)
-            if self._rules[i] == _AVOID:
+            pen.line(ends, fill=self._colours[i], width=2 * self._FINE)
+            if self._speakers[i] == "avoid":
                 self._disc(pen, float(path.x[i]), float(path.y[i]), 0.035, fill=COLOURS["avoid"])
         self._drawn = max(self._drawn, tick)
         image = self._trail.copy()
@@ -229,8 +272,8 @@ class _Panel:
         text.text((12, 9), self._title, fill=INK, font=_font(17, bold=True))
         clock = f"{tick / CONTROL_HZ:4.1f} s"
         text.text((image.width - 12, 10), clock, fill=INK, font=_font(16), anchor="ra")
-        note = "at the lamp" if path.at_lamp[tick] else _BEHAVIOUR_OF_RULE[self._rules[tick]]
-        text.text((12, framed.height - 26), note, fill=_COLOUR_OF_RULE[self._rules[tick]], font=_font(14, bold=True))
+        note = "at the lamp" if path.at_lamp[tick] else self._speakers[tick].replace("_", " ")
+        text.text((12, framed.height - 26), note, fill=self._colours[tick], font=_font(14, bold=True))
         return framed
 
     def _robot(self, pen: ImageDraw.ImageDraw, tick: int) -> None:
@@ -243,7 +286,7 @@ class _Panel:
         if distance < DISTANCE_MAX:
             ends = [self._at(*(here + reach * ahead)) for reach in (RADIUS, RADIUS + distance)]
             pen.line(ends, fill=COLOURS["avoid"], width=2 * self._FINE)
-        self._disc(pen, x, y, RADIUS, fill=_COLOUR_OF_RULE[self._rules[tick]], outline=INK, width=self._FINE)
+        self._disc(pen, x, y, RADIUS, fill=self._colours[tick], outline=INK, width=self._FINE)
         nose = [self._at(*(here + RADIUS * (a * ahead + b * aside))) for a, b in ((0.8, 0), (0.1, 0.4), (0.1, -0.4))]
         pen.polygon(nose, fill=PAPER)
         for reading, side in ((left, 1.0), (right, -1.0)):

@@ -8,13 +8,17 @@ import numpy as np
 import pandas as pd
 
 import sim
-from experiments.kit import Outcome
+from experiments.composition.rows import line_of
+from experiments.kit import Outcome, Page
 from experiments.kit.figures import BLUE, GREY, ORANGE, VERMILION
+from experiments.tasks.recorded import steps_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+ANIMATED = 0
+"""The start, in the arena large, whose path the animations and the timelines show."""
 SPEAKERS = {"seek_light": ORANGE, "avoid": VERMILION, "cruise": BLUE}
 ACROSS = 5
 
@@ -89,9 +93,27 @@ def familiarity(outcome: Outcome) -> Figure:
     figure = Figure(figsize=(9, 0.5 + 0.85 * max(len(found), 1)), layout="constrained")
     panels = figure.subplots(max(len(found), 1), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (name, frame) in zip(panels, found.items(), strict=False):
-        _timeline(axes, name, frame.loc[frame.episode == 0])
+        _timeline(axes, name, frame.loc[frame.episode == ANIMATED])
     panels[-1].set_xlabel("time (s)")
     return figure
+
+
+def animations(page: Page, outcome: Outcome) -> None:
+    """An animation of each policy on the same start, coloured by the behaviour that speaks."""
+    from sim import render
+
+    found = {name: frame for name, frame in kept(outcome).items() if "speaker" in frame}
+    if not found:
+        return
+    section = page.section("Who speaks")
+    section.text("The same start in the arena large, at twice the speed; below each picture the behaviour that speaks.")
+    (outcome.folder / "animations").mkdir(exist_ok=True)
+    for name, frame in found.items():
+        path = frame.loc[frame.episode == ANIMATED]
+        file = outcome.folder / "animations" / f"{name}.gif"
+        speakers = path.speaker.replace("", "nobody").tolist()
+        render.animate_steps(steps_of(path), name, file, sim.find_arena("large"), speakers)
+        section.picture(file.read_bytes(), f"Animation of {name}", line_of(name).about)
 
 
 def _timeline(axes: Axes, name: str, path: pd.DataFrame) -> None:

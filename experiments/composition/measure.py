@@ -15,12 +15,14 @@ from rich.progress import Progress
 import sim
 from behaviours import Demonstrations, Policy
 from behaviours.learning import no_convergence_warnings
-from experiments.composition.rows import ROWS, Line, Shown
+from experiments.composition.rows import Line, Shown, demonstrated, line_of
 from experiments.kit import Cell, Row
+from experiments.kit.intervals import bootstrap, wilson
 from experiments.kit.store import write_frame
 from experiments.tasks import agreement as agreeing
 from experiments.tasks import corral
 from experiments.tasks.asked_once import AskedOnce, EachAskedOnce
+from experiments.tasks.recorded import frame_of
 
 if TYPE_CHECKING:
     from experiments.composition.settings import Composition
@@ -58,8 +60,9 @@ class Moments:
 
 @dataclass(frozen=True)
 class Material:
-    """What all cells share: where files go, what is learned from, and the moments of each arena."""
+    """What all cells share: the settings, where files go, what is learned from, and the moments of each arena."""
 
+    settings: Composition
     folder: Path
     shown: Shown
     moments: dict[str, Moments]
@@ -67,23 +70,21 @@ class Material:
 
 def prepare(settings: Composition, folder: Path, progress: Progress) -> Material:
     """Let the teacher demonstrate in `default`, and drive held-out starts in every arena."""
-    first = corral.FIRST_DEMONSTRATION
-    episodes = range(first, first + settings.demonstrations)
-    train = corral.moving(corral.drive_together(settings, "teacher demonstrates", sim.Teacher(), episodes, progress))
-    shown = Shown(settings, train, corral.by_behaviour(train))
+    shown = demonstrated(settings, progress)
     moments = {}
     for name in settings.arenas:
-        what, asked = f"teacher in {name}", range(settings.heldout)
-        driven = corral.drive_together(settings, what, sim.Teacher(), asked, progress, sim.find_arena(name))
+        what, asked = f"held out in {name}", range(settings.heldout)
+        driven = corral.drive_together(settings, what, shown.rules, asked, progress, sim.find_arena(name))
         moments[name] = distinct(shown, corral.moving(driven))
-    return Material(folder, shown, moments)
+    return Material(settings, folder, shown, moments)
 
 
 def distinct(shown: Shown, samples: Demonstrations) -> Moments:
     """The moments of recorded runs that differ at the bins of the run, or in what the teacher does."""
     cells = shown.space(0).cells(samples.sensors)
     levels = corral.schema().command_levels(samples.commands)
-    fires = np.isin(sim.Teacher().rule(samples.sensors.numpy()), sim.BEHAVIOURS["avoid"])
+    avoid = [number for number, name in enumerate(shown.rules.names) if name == "avoid"]
+    fires = np.isin(shown.rules.first(samples.sensors.numpy()), avoid)
     key = torch.cat([cells, levels, torch.from_numpy(fires)[:, None]], 1).numpy()
     _, first, count = np.unique(key, axis=0, return_index=True, return_counts=True)
     chosen = torch.from_numpy(first)
@@ -94,20 +95,19 @@ def distinct(shown: Shown, samples: Demonstrations) -> Moments:
 
 def measure(material: Material, cell: Cell) -> list[Row]:
     """A record for each arena and codebook: success, agreement with the teacher, collisions."""
-    settings, line = material.shown.settings, ROWS[cell["row"]]
+    settings, line = material.settings, line_of(cell["row"])
     draws = range(settings.codebooks if line.codebooks else 1)
     with no_convergence_warnings():
         made = [line.make(material.shown, codebook) for codebook in draws]
-    together = len(made) > 1 or AskedOnce.possible(made[0])
-    driver = EachAskedOnce(made) if together else made[0]
     driving = settings if cell["engine"] == "vector" else replace(settings, engine="bullet", robots=None)
     found = []
     for name in settings.arenas:
         keep = name == PATHS_IN and cell["engine"] == "vector"
-        run = corral.drive(driving, driver, range(starts(settings, cell, name)), sim.find_arena(name), record=keep)
+        count = starts(settings, cell, name)
+        runs = drive_each(driving, made, count, name, keep)
         if keep:
-            write_paths(material.folder, cell["row"], made, run)
-        for codebook in draws:
+            write_paths(material.folder, cell["row"], made, runs, count)
+        for codebook, run in zip(draws, runs, strict=True):
             own = run.episode % len(draws) == codebook
             found.append(
                 {
@@ -120,6 +120,15 @@ def measure(material: Material, cell: Cell) -> list[Row]:
                 }
             )
     return found
+
+
+def drive_each(settings: Composition, made: list[Any], starts: int, arena: str, record: bool) -> list[sim.Rollout]:
+    """For each controller a rollout that holds its episodes: start e drives with controller e mod their number."""
+    where = sim.find_arena(arena)
+    if all(map(AskedOnce.possible, made)):
+        return [corral.drive(settings, EachAskedOnce(made), range(starts), where, record)] * len(made)
+    owned = [range(number, starts, len(made)) for number in range(len(made))]
+    return [corral.drive(settings, one, own, where, record) for one, own in zip(made, owned, strict=True)]
 
 
 def starts(settings: Composition, cell: Cell, arena: str) -> int:
@@ -145,17 +154,40 @@ def agreement(controller: Any, line: Line, moments: Moments) -> Row:
     }
 
 
-def write_paths(folder: Path, row: str, made: list[Any], run: sim.Rollout) -> None:
+def write_paths(folder: Path, row: str, made: list[Any], runs: list[sim.Rollout], starts: int) -> None:
     """Keep the first paths, with who spoke at each step and how well the condition was known."""
     paths = []
-    for episode in range(min(PATHS, len(run))):
-        steps, controller = run.slice(episode), made[episode % len(made)]
-        path = pd.DataFrame({"episode": episode, "x": steps.x, "y": steps.y, "success": bool(run.success[episode])})
+    for episode in range(min(PATHS, starts)):
+        controller, run = made[episode % len(made)], runs[episode % len(made)]
+        steps = run.slice(episode)
+        path = frame_of(steps).assign(episode=episode, success=bool(run.success[run.episode == episode][0]))
         if isinstance(controller, Policy):
-            recall = controller(steps.sensors)
-            assert recall.speaker is not None
-            path["speaker"] = np.array([*controller.names, ""])[recall.speaker.numpy()]
-            path["familiarity"] = recall.familiarity.numpy()
+            recalls = answers(controller, steps.sensors, episode)
+            speaker = np.concatenate([recall.speaker for recall in recalls])
+            path["speaker"] = np.array([*controller.names, ""])[speaker]
+            path["familiarity"] = np.concatenate([recall.familiarity for recall in recalls])
         paths.append(path)
     (folder / "paths").mkdir(exist_ok=True)
     write_frame(folder / "paths" / f"{row}.parquet", pd.concat(paths))
+
+
+def answers(policy: Policy, readings: NDArray[np.float64], episode: int) -> list[Any]:
+    """What a policy answers along one episode; one with a memory is asked step by step."""
+    if AskedOnce.possible(policy):
+        return [policy(readings)]
+    state, found = policy.start([episode]), []
+    for row in readings:
+        answer, state = policy.step(row[None], state)
+        found.append(answer)
+    return found
+
+
+def success_interval(own: pd.DataFrame) -> tuple[float, float]:
+    """The wider of Wilson's interval over the starts and the bootstrap's over the codebooks."""
+    low, high = wilson(int(own.successes.sum()), int(own.episodes.sum()))
+    driven = own.loc[own.episodes > 0]
+    rates = driven.successes.to_numpy() / driven.episodes.to_numpy()
+    if len(rates) > 1:
+        least, most = bootstrap(rates)
+        low, high = min(low, least), max(high, most)
+    return low, high

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+from rich.progress import Progress
 
 import sim
 from behaviours import (
+    POLICIES,
     Behaviour,
     BehaviourBank,
     Blending,
@@ -30,9 +33,10 @@ from experiments.models.baselines import CLASSIFIERS, Classified
 from experiments.models.behaviour_tree import BehaviourTree
 from experiments.tasks import corral
 from experiments.tasks.asked_once import EachAskedOnce
+from experiments.tasks.behaviours import Precedence
 
 if TYPE_CHECKING:
-    from experiments.composition.settings import Composition
+    from experiments.composition.settings import Combining
 
 MASKS = {"seek_light": ["light_left", "light_right"], "avoid": ["distance"]}
 """The sensors that each behaviour uses in the rows `masked_*`: prior knowledge. `cruise` uses all."""
@@ -45,12 +49,20 @@ class Shown:
     Attributes:
         settings: of the run.
         train: moments of the teacher's runs in the arena `default`.
-        apart: the same, by the behaviour whose rules fired.
     """
 
-    settings: Composition
+    settings: Combining
     train: Demonstrations
-    apart: dict[str, Demonstrations] = field(default_factory=dict)
+
+    @functools.cached_property
+    def rules(self) -> Precedence:
+        """The behaviours, the first of which that fires drives."""
+        return Precedence(self.settings.behaviours)
+
+    @functools.cached_property
+    def apart(self) -> dict[str, Demonstrations]:
+        """The moments by the behaviour that fired."""
+        return self.rules.apart(self.train)
 
     def space(self, codebook: int, record: str | None = None) -> Space:
         """One draw of the codebooks, with the run's record or another."""
@@ -69,8 +81,17 @@ class Shown:
     def evident_bank(self, codebook: int, masks: dict[str, list[str]] | None = None) -> BehaviourBank:
         """The same, each silent where only others know, and louder the more it has seen."""
         bank = BehaviourBank(self.space(codebook))
-        bank.learn_apart(self.apart, parts.rule(self.settings.evident), sensors=masks)
+        own = {name: sensors for name, sensors in (masks or {}).items() if name in self.apart}
+        bank.learn_apart(self.apart, parts.rule(self.settings.evident), sensors=own)
         return bank
+
+
+def demonstrated(settings: Combining, progress: Progress) -> Shown:
+    """Let the behaviours demonstrate in the arena `default`, the first that fires at each step."""
+    first = corral.FIRST_DEMONSTRATION
+    episodes = range(first, first + settings.demonstrations)
+    rules = Precedence(settings.behaviours)
+    return Shown(settings, corral.moving(corral.drive_together(settings, "demonstrations", rules, episodes, progress)))
 
 
 @dataclass(frozen=True)
@@ -81,11 +102,13 @@ class Line:
         make: `make(shown, codebook)` returns what drives.
         about: what it is, in a few words.
         codebooks: whether it is made anew for each draw of the codebooks.
+        memory: whether it has a memory.
     """
 
     make: Callable[[Shown, int], Any]
     about: str
     codebooks: bool = True
+    memory: bool = False
 
 
 def together(shown: Shown, codebook: int, record: str | None = None) -> Behaviour:
@@ -105,7 +128,7 @@ def evident_sum(shown: Shown, codebook: int) -> Bundle:
 
 def masked_sum(shown: Shown, codebook: int) -> MotorSchema:
     """The scores of behaviours that see their own sensors only, with precedence for the light."""
-    loud = {"seek_light": shown.settings.precedence}
+    loud = {name: shown.settings.precedence for name in ("seek_light",) if name in shown.apart}
     return MotorSchema(shown.evident_bank(codebook, MASKS), loud, familiarity=False)
 
 
@@ -122,10 +145,10 @@ def paper_sum(shown: Shown, codebook: int) -> Behaviour:
 
 
 class Oracle:
-    """Asks the program of the behaviour that the teacher's rules would choose."""
+    """Asks the program of the behaviour that fires first."""
 
-    def __init__(self, banks: list[BehaviourBank]) -> None:
-        self.names = banks[0].names
+    def __init__(self, rules: Precedence, banks: list[BehaviourBank]) -> None:
+        self.rules, self.names = rules, banks[0].names
         self.parts = [EachAskedOnce([bank[name] for bank in banks]) for name in self.names]
 
     def start(self, episodes: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -136,10 +159,10 @@ class Oracle:
         self, readings: NDArray[np.float64], which: NDArray[np.int64]
     ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
         """Commands `[B, 2]`."""
-        fires = sim.Teacher().rule(readings)
+        first = self.rules.first(readings)
         commands = np.zeros((len(readings), len(sim.ACTUATORS)))
-        for name, part in zip(self.names, self.parts, strict=True):
-            rows = np.isin(fires, sim.BEHAVIOURS[name])
+        for number, part in enumerate(self.parts):
+            rows = first == number
             if rows.any():
                 commands[rows] = part.step(readings[rows], which[rows])[0].commands.numpy()
         return commands, which
@@ -156,14 +179,14 @@ def masked(made: Callable[[BehaviourBank], Controller]) -> Callable[[Shown, int]
 
 
 ROWS: dict[str, Line] = {
-    "teacher": Line(lambda shown, codebook: sim.Teacher(), "the rules that were shown", codebooks=False),
+    "teacher": Line(lambda shown, codebook: shown.rules, "the rules that were shown", codebooks=False),
     "nearest_neighbour": Line(
         lambda shown, codebook: Classified(CLASSIFIERS["nearest_neighbour"](shown.settings.seed), shown.train),
         "all demonstrations kept",
         codebooks=False,
     ),
     "oracle": Line(
-        lambda shown, codebook: Oracle([shown.bank(each) for each in range(shown.settings.codebooks)]),
+        lambda shown, codebook: Oracle(shown.rules, [shown.bank(each) for each in range(shown.settings.codebooks)]),
         "separate programs; the teacher's rules say which one is asked",
         codebooks=False,
     ),
@@ -192,3 +215,17 @@ ROWS: dict[str, Line] = {
     ),
 }
 """All rows by name."""
+
+
+def rows_known() -> list[str]:
+    """What can be a row: those above, and every other policy by its name, over behaviours learned apart."""
+    return list(dict.fromkeys([*ROWS, *POLICIES]))
+
+
+def line_of(name: str) -> Line:
+    """The row of this name."""
+    if name in ROWS:
+        return ROWS[name]
+    made = POLICIES.find(name)
+    about = next(iter((made.__doc__ or name).splitlines()))
+    return Line(plain(made), about, memory=getattr(made, "start", None) is not Controller.start)

@@ -5,50 +5,68 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import sim
-from experiments.composition.rows import ROWS
+from experiments.composition.rows import ROWS, rows_known
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.tasks import corral
+from experiments.tasks.behaviours import BEHAVIOURS
 
 ARENAS = ["default", "narrow", "large", "offset_lamp", "clutter", "two_gaps"]
 
 
 @dataclass
-class Composition(corral.Learning):
-    """The settings of this study."""
+class Combining(corral.Learning):
+    """How behaviours are learned apart and combined; several studies share it."""
 
     encoder: Part = part("encoder", "level_wide", "the code of one reading")
     paper: corral.Paper = settings(corral.Paper, "the row paper_sum: the printed algorithms, read literally")
-    rows: list[str] = setting(list(ROWS), "the rows of the table, in this order", choices=lambda: ROWS, distinct=True)
+    evident: Part = part("rule", "evident", "how evident_sum learns: silent where only others know, louder by evidence")
+    precedence: float = setting(2.4, "masked_sum: how much louder seek_light is than the others", above=0)
+    behaviours: list[str] = setting(
+        list(sim.BEHAVIOURS), "what is learned apart; where several fire, the first of these is shown",
+        choices=lambda: BEHAVIOURS, distinct=True,
+    )  # fmt: skip
+    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    codebooks: int = setting(10, "draws of the codebooks; start e drives with codebook e mod this number", low=1)
+
+
+@dataclass
+class Composition(Combining):
+    """The settings of the study of policies."""
+
+    rows: list[str] = setting(
+        list(ROWS), "the rows of the table, in this order; any policy is one, too", choices=rows_known, distinct=True
+    )
     bullet_rows: list[str] = setting(
         ["teacher", "joint_program", "evident_sum", "masked_priority", "masked_sum"],
-        "rows that drive in the physics engine, too", choices=lambda: ROWS, distinct=True, empty=True,
+        "rows that drive in the physics engine, too", choices=rows_known, distinct=True, empty=True,
     )  # fmt: skip
     arenas: list[str] = setting(ARENAS, "where they drive; all learn in `default`", choices=sim.ARENAS, distinct=True)
     starts: int = setting(1000, "held-out starts in default and large, over all codebooks", low=1)
     other_starts: int = setting(500, "held-out starts in every other arena", low=1)
     bullet_starts: int = setting(200, "held-out starts in the physics engine", low=1)
     heldout: int = setting(200, "episodes of the teacher in each arena about which programs are asked", low=1)
-    codebooks: int = setting(10, "draws of the codebooks; start e drives with codebook e mod this number", low=1)
-    precedence: float = setting(2.4, "masked_sum: how much louder seek_light is than the others", above=0)
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
-    evident: Part = part("rule", "evident", "how evident_sum learns: silent where only others know, louder by evidence")
 
 
 def check(settings: Composition) -> None:
     """Raise for settings with which something could not be learned or driven."""
-    space = corral.space(settings)
-    parts.refuse_unsupported(parts.rule(settings.rule), space)
+    check_learning(settings)
     for name in settings.arenas:
         if name not in corral.arenas():
             known = ", ".join(corral.arenas())
             raise ValueError(f"arenas: in {name} there is more than one light; choose from {known}")
+    for name in settings.bullet_rows:
+        if name not in settings.rows:
+            raise ValueError(f"bullet_rows: {name} is not among the rows")
+
+
+def check_learning(settings: Combining) -> None:
+    """Raise for rules that cannot train the architecture's programs, or cannot keep silence."""
+    space = corral.space(settings)
+    parts.refuse_unsupported(parts.rule(settings.rule), space)
     evident = parts.rule(settings.evident)
     parts.refuse_unsupported(evident, space)
     if not evident.supports_silence:
         raise ValueError(f"evident={evident.name} cannot keep silence; choose error_driven, least_squares or evident")
-    for name in settings.bullet_rows:
-        if name not in settings.rows:
-            raise ValueError(f"bullet_rows: {name} is not among the rows")
 
 
 PRESETS = {

@@ -12,11 +12,12 @@ from __future__ import annotations
 import pandas as pd
 
 from experiments.composition import figures
-from experiments.composition.measure import measure, prepare
-from experiments.composition.rows import ROWS
+from experiments.composition.measure import measure, prepare, success_interval
+from experiments.composition.rows import line_of
 from experiments.composition.settings import PRESETS, Composition, check
-from experiments.kit import Cell, Column, Drawing, Outcome, Row, Study, Table, grid
-from experiments.kit.intervals import bootstrap, wilson
+from experiments.kit import Cell, Column, Drawing, Outcome, Page, Row, Study, Table, grid
+from experiments.kit.intervals import bootstrap
+from experiments.kit.study import plain_page
 
 
 def cells(settings: Composition) -> list[Cell]:
@@ -50,17 +51,6 @@ def summarise(settings: Composition, records: pd.DataFrame) -> list[Row]:
     return sorted(table, key=lambda row: order.index(row["row"]))
 
 
-def success_interval(own: pd.DataFrame) -> tuple[float, float]:
-    """The wider of Wilson's interval over the starts and the bootstrap's over the codebooks."""
-    low, high = wilson(int(own.successes.sum()), int(own.episodes.sum()))
-    driven = own.loc[own.episodes > 0]
-    rates = driven.successes.to_numpy() / driven.episodes.to_numpy()
-    if len(rates) > 1:
-        least, most = bootstrap(rates)
-        low, high = min(low, least), max(high, most)
-    return low, high
-
-
 def headline(outcome: Outcome) -> str:
     """How near a plain sum comes to joint training, and how far masked behaviours reach."""
     found = {(row["row"], row["arena"]): row for row in outcome.table}
@@ -86,8 +76,14 @@ def tables(outcome: Outcome) -> list[Table]:
     for arena in outcome.settings.arenas:
         rows = [row for row in outcome.table if row["arena"] == arena]
         shown.append(Table(f"Arena {arena}", COLUMNS).show(rows))
-    rows = [{"row": name, "about": ROWS[name].about} for name in outcome.settings.rows]
+    rows = [{"row": name, "about": line_of(name).about} for name in outcome.settings.rows]
     return [*shown, Table("What the rows are", [Column("row"), Column("about", "what it is")], words=True).show(rows)]
+
+
+def page(page: Page, outcome: Outcome, study: Study) -> None:
+    """The usual page, and an animation of each policy."""
+    plain_page(page, outcome, study)
+    figures.animations(page, outcome)
 
 
 COLUMNS = [
@@ -148,6 +144,7 @@ study = Study(
         ),
     ],
     headline=headline,
+    page=page,
     method=METHOD,
     check=check,
     presets=PRESETS,

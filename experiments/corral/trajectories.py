@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +13,7 @@ import sim
 from behaviours import Behaviour, Policy
 from experiments.corral.command_map import COMMANDS, kinds
 from experiments.tasks import corral
+from experiments.tasks.recorded import SENSORS, frame_of, steps_of
 from sim.teachers.escape import TEACHER_COMMANDS
 from sim.tracker import DWELL_SECONDS
 
@@ -22,10 +22,6 @@ if TYPE_CHECKING:
 
 SHOWN = 12
 """Starts kept for each controller; more trajectories hide each other."""
-
-SENSORS = [sensor.name for sensor in sim.SENSORS]
-MOTORS = [actuator.name for actuator in sim.ACTUATORS]
-STEP = [field.name for field in fields(sim.Steps) if field.name not in ("sensors", "commands")]
 
 EPISODE = {
     "episode": "episode",
@@ -49,8 +45,8 @@ def control_steps(rollout: sim.Rollout) -> pd.DataFrame:
     teacher's as indices into `command_map.COMMANDS`, and `differs` tells whether they are different.
     """
     path = rollout.trajectory
-    frame = pd.DataFrame({"episode": rollout.step_episode, **{name: getattr(path, name) for name in STEP}})
-    frame[SENSORS], frame[MOTORS] = path.sensors, path.commands
+    frame = frame_of(path)
+    frame.insert(0, "episode", rollout.step_episode)
     frame["seconds"] = frame.step / sim.CONTROL_HZ
     frame["rule"] = sim.Teacher().rule(path.sensors)
     frame["command"] = kinds(np.clip(path.commands, -1, 1))
@@ -125,11 +121,7 @@ def as_rollout(steps: pd.DataFrame, episodes: pd.DataFrame, settings: Corral) ->
         seconds=settings.seconds,
         dwell_seconds=DWELL_SECONDS,
         start=episodes[START].to_numpy(),
-        trajectory=sim.Steps(
-            sensors=steps[SENSORS].to_numpy(),
-            commands=steps[MOTORS].to_numpy(),
-            **{name: steps[name].to_numpy() for name in STEP},
-        ),
+        trajectory=steps_of(steps),
         offsets=np.concatenate([[0], np.cumsum(columns["steps"])]),
         **columns,
     )

@@ -15,7 +15,7 @@ from behaviours import Gradient, Rule, Space
 from behaviours.learning import no_convergence_warnings
 from experiments.kit import parts
 from experiments.models.baselines import Classified
-from experiments.observability.disturbances import Disturbance
+from experiments.models.disturbances import Disturbance
 from experiments.observability.memory import Memory, TeacherRuns
 from experiments.observability.windows import Answer, ProgramAnswer, over_windows
 from experiments.tasks import corral

@@ -13,7 +13,7 @@ from torch import Tensor
 
 import sim
 from behaviours import Demonstrations
-from experiments.observability.disturbances import Disturbance, Floats, Integers, disturb_in_turns
+from experiments.models.disturbances import Disturbance, Floats, Integers, disturb_in_turns
 from experiments.tasks.corral import shown_in
 from torchvsa.encoders.history import no_past, window, windows
 

@@ -24,7 +24,7 @@ from experiments.kit.figures import (
     legend_below,
     panels,
 )
-from experiments.observability.disturbances import DISTURBANCES
+from experiments.models.disturbances import DISTURBANCES
 from experiments.observability.learners import LEARNERS
 
 LOOKS = {

@@ -19,8 +19,8 @@ from rich.progress import Progress
 import sim
 from behaviours import Space
 from experiments.kit import Cell, Row, Study, grid, parts, setting, settings
+from experiments.models.disturbances import DISTURBANCES, Aliased, Disturbance
 from experiments.observability import results
-from experiments.observability.disturbances import DISTURBANCES, Aliased, Disturbance
 from experiments.observability.learners import LEARNERS, Task, compare, disturbed_rule
 from experiments.observability.memory import TeacherRuns
 from experiments.observability.windows import WindowPolicy

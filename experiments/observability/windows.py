@@ -10,7 +10,7 @@ import torch
 from torch import Tensor
 
 from behaviours import Behaviour, Demonstrations, Schema, Space
-from experiments.observability.disturbances import Disturbance, Floats, Integers
+from experiments.models.disturbances import Disturbance, Floats, Integers
 from experiments.observability.memory import Memory
 from torchvsa.encoders import Encoder, History
 

@@ -14,8 +14,8 @@ from sklearn.tree import DecisionTreeClassifier
 
 import sim
 from behaviours import Demonstrations
+from experiments.models.damage import Array, Damage, Floats
 from experiments.models.fitting import fit_seconds
-from experiments.robustness.damage import Array, Damage, Floats
 
 Parameters = tuple[Floats, NDArray[np.int64] | slice, float]
 """An array of a model, those of its rows that can be damaged, and what they are mirrored in (see `Array`)."""

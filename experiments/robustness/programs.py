@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from behaviours import Behaviour, Space
-from experiments.robustness.damage import Array, Damage, Floats
+from experiments.models.damage import Array, Damage, Floats
 
 BLOCK = 512
 """Conditions that are encoded at once, to bound the memory that they take."""

@@ -9,7 +9,7 @@ from matplotlib.ticker import PercentFormatter
 
 from experiments.kit import Column, Drawing, Outcome, Row, Table, pivot
 from experiments.kit.figures import BLUE, GREEN, ORANGE, PURPLE, VERMILION, by_measure, legend_below, panels
-from experiments.robustness.damage import DAMAGES, PARAMETERS, PARTS
+from experiments.models.damage import DAMAGES, PARAMETERS, PARTS
 
 LOOKS = {
     "default": (BLUE, "o"),

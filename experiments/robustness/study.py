@@ -23,9 +23,9 @@ import torchvsa
 from behaviours import Demonstrations, Space
 from experiments.kit import Cell, Row, Study, aggregated, grid, parts, setting, settings
 from experiments.models import hand_written
+from experiments.models.damage import DAMAGES, PARAMETERS, PARTS, Damage, Learner
 from experiments.robustness import results
 from experiments.robustness.baselines import network, tree
-from experiments.robustness.damage import DAMAGES, PARAMETERS, PARTS, Damage, Learner
 from experiments.robustness.programs import Program, refuse_undamageable
 from experiments.tasks import corral
 from experiments.tasks.agreement import share_right

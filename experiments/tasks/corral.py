@@ -19,6 +19,7 @@ from experiments.kit.intervals import proportion
 from experiments.kit.options import GROUPS, Group
 from experiments.kit.pool import processes
 from experiments.tasks.asked_once import AskedOnce
+from experiments.tasks.behaviours import Precedence
 
 COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
@@ -199,12 +200,7 @@ def by_behaviour(shown: Demonstrations) -> dict[str, Demonstrations]:
 
     Raises `ValueError` for a behaviour without any.
     """
-    fires = sim.Teacher().rule(shown.sensors.numpy())
-    found = {name: shown.where(np.isin(fires, rules)) for name, rules in sim.BEHAVIOURS.items()}
-    for name, samples in found.items():
-        if not len(samples):
-            raise ValueError(f"no demonstration shows {name!r}; give it more of them (demonstrations=...)")
-    return found
+    return Precedence(list(sim.BEHAVIOURS)).apart(shown)
 
 
 def from_file(path: str | Path) -> Demonstrations:

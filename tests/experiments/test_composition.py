@@ -24,8 +24,7 @@ SMALL = ("vsa.dim=512", "demonstrations=6", "heldout=3", "codebooks=2", "seconds
 
 def shown() -> Shown:
     driven = sim.rollout(sim.Teacher(), episodes=range(1_000_000, 1_000_006), seconds=25, record=True)
-    train = corral.moving(driven)
-    return Shown(composed(study, *SMALL), train, corral.by_behaviour(train))
+    return Shown(composed(study, *SMALL), corral.moving(driven))
 
 
 def test_rows_drive_in_each_arena_with_several_codebooks(tmp_path: Path) -> None:

@@ -10,8 +10,8 @@ from kits import composed
 
 import sim
 from behaviours import Demonstrations
+from experiments.models.damage import DAMAGES, PARTS, Array, Damage, Learner
 from experiments.robustness.baselines import Baseline
-from experiments.robustness.damage import DAMAGES, PARTS, Array, Damage, Learner
 from experiments.robustness.programs import Program
 from experiments.robustness.study import LEARNERS, Robustness, study
 

@@ -18,7 +18,7 @@ from behaviours import Demonstrations
 from experiments.kit import Outcome
 from experiments.kit.run import check_all, run
 from experiments.main import main
-from experiments.observability.disturbances import DISTURBANCES, HIGH, LOW, Disturbance
+from experiments.models.disturbances import DISTURBANCES, HIGH, LOW, Disturbance
 from experiments.observability.learners import Learned, Task, best, compare
 from experiments.observability.memory import Memory, TeacherRuns
 from experiments.observability.results import FIGURE, means, tables

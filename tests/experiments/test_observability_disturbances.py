@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import sim
-from experiments.observability.disturbances import DISTURBANCES, HIGH, LOW, Stuck, disturb_in_turns
+from experiments.models.disturbances import DISTURBANCES, HIGH, LOW, Stuck, disturb_in_turns
 
 
 def recording(episodes: int = 6, steps: int = 80) -> tuple[Any, Any, Any]:

@@ -6,6 +6,7 @@ import numpy as np
 import policies
 import pytest
 from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -66,6 +67,22 @@ def test_the_animation(pair: tuple[Rollout, Rollout], tmp_path: Path) -> None:
     half = first.shape[1] // 2
     assert np.abs(first - last)[:, :half].max() > 100
     assert np.abs(first - last)[:, half:].max() > 100
+
+
+def test_an_animation_shows_who_speaks(pair: tuple[Rollout, Rollout], tmp_path: Path) -> None:
+    steps, arena = pair[0].slice(1), pair[0].arena
+    last = {}
+    for name in ("avoid", "cruise"):
+        path = render.animate_steps(steps, "one", tmp_path / f"{name}.gif", arena, [name] * len(steps), frames=10)
+        with Image.open(path) as gif:
+            gif.seek(getattr(gif, "n_frames", 1) - 1)
+            last[name] = np.asarray(gif.convert("RGB")).astype(int).reshape(-1, 3)
+    colours = {name: np.array(to_rgb(render.COLOURS[name])) * 255 for name in last}
+    for name, pixels in last.items():
+        near = {other: (np.abs(pixels - colour).max(1) < 12).sum() for other, colour in colours.items()}
+        assert near[name] > 5 * near["cruise" if name == "avoid" else "avoid"]
+    with pytest.raises(ValueError, match="one speaker per step"):
+        render.animate_steps(steps, "one", tmp_path / "d.gif", arena, ["avoid"])
 
 
 def test_the_animation_of_the_most_typical_episode(pair: tuple[Rollout, Rollout]) -> None:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 import sim
 from experiments.models import draws
+from sim.controller import as_controller
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -183,6 +184,23 @@ class Aliased(Disturbance):
 
 
 DISTURBANCES: dict[str, type[Disturbance]] = {d.name: d for d in (Missing, Stuck, Delayed, Noisy, Aliased)}
+
+
+class Disturbed:
+    """A controller whose sensors are disturbed. Its state is that of the disturbance and that of the controller."""
+
+    def __init__(self, disturbance: Disturbance, controller: sim.ControllerLike) -> None:
+        self.disturbance, self.controller = disturbance, as_controller(controller)
+
+    def start(self, episodes: Integers) -> tuple[Any, Any]:
+        """See `sim.Controller`."""
+        return self.disturbance.start(episodes), self.controller.start(episodes)
+
+    def step(self, readings: Floats, state: tuple[Any, Any]) -> tuple[Any, tuple[Any, Any]]:
+        """What the controller answers to the disturbed readings `[B, n]`."""
+        readings, disturbance = self.disturbance.step(readings, state[0])
+        answer, inner = self.controller.step(readings, state[1])
+        return answer, (disturbance, inner)
 
 
 def disturb_in_turns(disturbances: Sequence[Disturbance], readings: Floats, episodes: Integers) -> Floats:
