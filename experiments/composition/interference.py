@@ -15,12 +15,14 @@ from typing import Any
 
 import pandas as pd
 
+import sim
 from behaviours import Demonstrations, OneShot
 from experiments.composition import interference_figures as figures
 from experiments.composition import interference_tables as tables
 from experiments.composition import sums
 from experiments.kit import Cell, Drawing, Part, Row, Study, grid, part, parts, setting
 from experiments.tasks import corral
+from experiments.tasks.behaviours import BEHAVIOURS
 
 MARGINS = (0.0, 1.0, 2.0, 5.0, 10.0)
 LEARNERS: dict[str, dict[str, Any]] = {
@@ -51,6 +53,10 @@ class Interference(corral.Learning):
     sources: list[str] = setting(
         list(sums.SOURCES), "where joint samples are drawn: anywhere, or where several behaviours know the condition",
         choices=sums.SOURCES, distinct=True,
+    )  # fmt: skip
+    behaviours: list[str] = setting(
+        list(sim.BEHAVIOURS), "what is learned apart; where several fire, the first of these is shown",
+        choices=lambda: BEHAVIOURS, distinct=True,
     )  # fmt: skip
     draws: int = setting(3, "draws of the joint samples, for each draw of the codebooks", low=1)
     codebooks: int = setting(10, "draws of the codebooks", low=1)
@@ -105,9 +111,9 @@ def metrics(settings: Interference, records: pd.DataFrame, table: list[Row]) -> 
 
 
 METHOD = """
-The teacher drives in the arena; these runs are all that is shown. Three behaviours (seek light, avoid, cruise) learn
-from the moments in which their own rules fire, each without the others, or silent in conditions that only others know.
-Held-out moments are those of other runs, until the robot is at the lamp.
+The teacher drives in the arena `default`; these runs are all that is shown. Three behaviours (seek light, avoid,
+cruise) learn from the moments in which their own rules fire, each without the others, or silent in conditions that only
+others know. Held-out moments are those of other runs, until the robot is at the lamp.
 
 Scores are linear in the program: the lead of a result in a sum is the sum of its leads in each program. So the programs
 alone say which moments the sum answers as the teacher does. A lead is given in units of the score that a stored pair

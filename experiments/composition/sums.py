@@ -12,12 +12,11 @@ from jaxtyping import Float64
 from numpy.typing import NDArray
 from torch import Tensor
 
-import sim
 from behaviours import Behaviour, BehaviourBank, Demonstrations, Rule
 from behaviours.ordered import distinct_rows
 from experiments.composition.measure import Moments, distinct
-from experiments.composition.rows import Shown
-from experiments.composition.settings import Composition
+from experiments.composition.rows import Shown, demonstrated
+from experiments.composition.settings import Combining
 from experiments.kit import Cell, Row, parts
 from experiments.tasks import corral
 
@@ -39,9 +38,9 @@ class Material:
 
     Attributes:
         settings: of the run.
-        shown: the teacher's runs, and by behaviour.
-        moments: held-out moments of the teacher.
-        owner: `[M]`, the behaviour whose rule fires at each of them.
+        shown: demonstrations, and by behaviour.
+        moments: held-out moments.
+        owner: `[M]`, the behaviour that fires at each of them.
         knows: `[M, b]`, whether each behaviour was shown the condition.
         shared: `[N]`, whether several behaviours know the condition of each demonstrated sample.
     """
@@ -60,35 +59,28 @@ class Material:
         return np.select([count > 1, own, count == 1], [SEVERAL, RIGHT, OTHER], NOBODY)
 
 
+def combining(settings: Interference) -> Combining:
+    """The settings with which the behaviours are demonstrated and learned apart."""
+    shared = [field.name for field in fields(corral.Learning)] + ["behaviours", "demonstrations", "codebooks"]
+    return Combining(**{name: getattr(settings, name) for name in shared})
+
+
 def prepare(settings: Interference, folder: Path, progress: Any) -> Material:
-    """Let the teacher demonstrate, and drive held-out starts."""
-    first, arena = corral.FIRST_DEMONSTRATION, corral.arena(settings.arena)
-    found = []
-    for what, episodes in (
-        ("teacher demonstrates", range(first, first + settings.demonstrations)),
-        ("held-out runs", range(settings.heldout)),
-    ):
-        driven = corral.drive_together(settings, what, sim.Teacher(), episodes, progress, arena)
-        found.append(corral.moving(driven))
-    return material(settings, *found)
+    """Let the behaviours demonstrate, and drive held-out starts."""
+    shown, arena = demonstrated(combining(settings), progress), corral.arena(settings.arena)
+    asked = corral.drive_together(settings, "held out", shown.rules, range(settings.heldout), progress, arena)
+    return material(settings, shown, corral.moving(asked))
 
 
-def material(settings: Interference, train: Demonstrations, heldout: Demonstrations) -> Material:
-    """What all cells share, from demonstrated and held-out moments."""
-    common = {field.name: getattr(settings, field.name) for field in fields(corral.Learning)}
-    shown = Shown(Composition(**common), train, corral.by_behaviour(train))
-    moments = distinct(shown, heldout)
-    space = shown.space(0)
-    owner = _owner(moments.shown)
+def material(settings: Interference, shown: Shown, heldout: Demonstrations) -> Material:
+    """What all cells share, from demonstrated moments, and from held-out ones in which a behaviour fires."""
+    fires = shown.rules.first(heldout.sensors.numpy()) < len(shown.rules.names)
+    moments = distinct(shown, heldout.where(fires))
+    space, asked = shown.space(0), moments.shown.sensors
     known = [space.cells(part.sensors) for part in shown.apart.values()]
-    knows = _within(space.cells(moments.shown.sensors), known)
-    shared = _within(space.cells(train.sensors), known).sum(1) > 1
-    return Material(settings, shown, moments, owner, knows, shared)
-
-
-def _owner(samples: Demonstrations) -> NDArray[np.int64]:
-    fires = sim.Teacher().rule(samples.sensors.numpy())
-    return np.argmax([np.isin(fires, rules) for rules in sim.BEHAVIOURS.values()], 0)
+    shared = _within(space.cells(shown.train.sensors), known).sum(1) > 1
+    owner = shown.rules.first(asked.numpy())
+    return Material(settings, shown, moments, owner, _within(space.cells(asked), known), shared)
 
 
 def _within(cells: Tensor, known: list[Tensor]) -> NDArray[np.bool_]:

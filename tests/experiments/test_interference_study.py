@@ -13,7 +13,7 @@ from behaviours import Bundle
 from experiments.composition import sums
 from experiments.composition.interference import study
 from experiments.composition.measure import agreement
-from experiments.composition.rows import ROWS
+from experiments.composition.rows import ROWS, Shown
 from experiments.kit.run import check_all, run
 from experiments.tasks import corral
 
@@ -27,7 +27,8 @@ def given() -> sums.Material:
         corral.moving(sim.rollout(sim.Teacher(), episodes=range(first, first + count), seconds=20))
         for first, count in ((corral.FIRST_DEMONSTRATION, 4), (0, 3))
     )
-    return sums.material(composed(study, *SMALL), train, heldout)
+    settings = composed(study, *SMALL)
+    return sums.material(settings, Shown(sums.combining(settings), train), heldout)
 
 
 def test_all_parts_are_measured(tmp_path: Path) -> None:
