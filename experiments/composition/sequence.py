@@ -28,11 +28,7 @@ from experiments.tasks import two_lamps as task
 from experiments.tasks.agreement import share_right
 
 TEACHER, VECTOR, COMMON = "teacher", "one_vector", "one_vector_common"
-ROWS = {
-    TEACHER: "five rules for each lamp in turn",
-    VECTOR: "programs, contexts and transition in one hypervector",
-    COMMON: "the same, from the starts where the teacher succeeds",
-}
+"""The rows of the table: five rules for each lamp in turn; one hypervector; the same from starts the teacher solves."""
 MOST_CODEBOOKS = 1000
 
 
@@ -172,7 +168,7 @@ def headline(outcome: Outcome) -> str:
 TABLE = Table(
     "First blue, then yellow",
     [
-        Column("row"),
+        Column("row", about="one_vector_common: one_vector from the starts where the teacher succeeds"),
         Column("arena"),
         Column("engine"),
         Column("episodes", "starts", ",d"),
@@ -183,7 +179,6 @@ TABLE = Table(
             "share of the teacher's moments on its way to the yellow lamp in which 'to yellow' commands the same, mean "
             "over codebooks, with their bootstrap"
         )),
-        Column("about", "what it is", lambda row: ROWS[row["row"]]),
     ],
 )  # fmt: skip
 METHOD = """
