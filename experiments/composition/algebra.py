@@ -30,7 +30,7 @@ class Codebooks:
     removal: int = setting(3, "for removal", low=1, high=MOST_CODEBOOKS)
     mirror: int = setting(10, "for mirror images", low=1, high=MOST_CODEBOOKS)
     distance: int = setting(2, "for distance", low=1, high=MOST_CODEBOOKS)
-    recognition: int = setting(1, "for recognition", low=1, high=MOST_CODEBOOKS)
+    recognition: int = setting(5, "for recognition", low=1, high=MOST_CODEBOOKS)
     interpolation: int = setting(6, "for the switching weight", low=1, high=MOST_CODEBOOKS)
 
 
@@ -117,7 +117,8 @@ Recognition: sequences are random steps of one held-out run. Many steps look ali
 uniform choice among the rules that agree with every step. Interpolation: seek is the teacher, flee turns away from
 light.
 """
-QUICK = {"codebooks": {"removal": 1, "mirror": 2, "distance": 1, "interpolation": 2}, "demonstrations": 6, "tested": 20,
+QUICK = {"codebooks": {"removal": 1, "mirror": 2, "distance": 1, "recognition": 1, "interpolation": 2},
+         "demonstrations": 6, "tested": 20,
          "variants": 8, "readings_shown": 100, "compared": 500, "sequences": 400, "rules": ["one_shot"],
          "recognition_demonstrations": 10}  # fmt: skip
 

@@ -34,8 +34,9 @@ def recognised(own: pd.DataFrame) -> list[Row]:
     columns = {"sequences": ("sequences", "sum")}
     shares = ("recognised", "ceiling", "where_one_is_left")
     columns |= {name: (name, "mean") for name in shares if name in own}
+    columns |= {"recognised_low": ("recognised", "min"), "recognised_high": ("recognised", "max")}
     rows = aggregated(own, ["steps"], columns)
-    return [row | {"steps": int(row["steps"])} for row in rows]
+    return [row | {name: int(row[name]) for name in ("steps", "sequences")} for row in rows]
 
 
 def distances(own: pd.DataFrame) -> list[Row]:
@@ -129,7 +130,9 @@ TABLES = {
     "recognition": Table("Which behaviour is a robot running?", [
         Column("steps", about="random control steps of one episode that are seen"),
         Column("sequences"),
-        Column("recognised", format=".3f", about="share of the sequences whose behaviour is found"),
+        Column("recognised", format=".3f", interval=("recognised_low", "recognised_high"), about=(
+            "share of the sequences whose behaviour is found; mean over codebooks [lowest, highest]"
+        )),
         Column("ceiling", format=".3f", about="what the true rules could tell"),
         Column("where_one_is_left", "one left", ".3f", about="share found where only one rule agrees with all steps"),
     ]),

@@ -49,6 +49,7 @@ def test_what_is_measured_is_what_theory_says(tmp_path: Path) -> None:
     assert outcome.metrics["recognition.50.recognised"] == many["recognised"]
     assert outcome.metrics["distance.uniform.one_shot.same.spearman"] == near["spearman"]
     assert len(study.shown(outcome)) == 5
+    assert few["recognised_low"] == few["recognised"] == few["recognised_high"]
     assert "removal is exact with 1 of 1 codebooks" in study.headline(outcome).lower()
     assert (tmp_path / "figures" / "algebra.png").is_file()
 
