@@ -130,8 +130,10 @@ class BehaviourBank(nn.Module):
         before = self[name]
         behaviour = rule.partial_fit(before, demonstrations, progress)
         behaviour.calibrate(demonstrations)
-        if before.threshold is not None and behaviour.threshold is not None:
-            behaviour.threshold = min(before.threshold, behaviour.threshold)
+        for least in _LEAST:
+            values = getattr(before, least), getattr(behaviour, least)
+            if None not in values:
+                setattr(behaviour, least, min(values))
         self.add(name, behaviour)
         return behaviour.report
 
@@ -243,7 +245,7 @@ class BehaviourBank(nn.Module):
                 entries = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
                 terms = [entry.get("terms") for entry in about["behaviours"]]
                 used = [entry.get("sensors") for entry in about["behaviours"]]
-                thresholds = [_threshold(entry.get("threshold")) for entry in about["behaviours"]]
+                least = [{name: _least(name, entry.get(name)) for name in _LEAST} for entry in about["behaviours"]]
                 for name, _ in entries:
                     check_name(name)
                 if len({name for name, _ in entries}) < len(entries):
@@ -268,12 +270,14 @@ class BehaviourBank(nn.Module):
                     check_levels(space.schema, results)
                     parsed = () if terms[number] is None else terms_from_dicts(terms[number], results)
                     behaviour = Behaviour(spaces[number], program, known, results, report, parsed)
-                    behaviour.threshold = thresholds[number]
+                    for least_name, value in least[number].items():
+                        setattr(behaviour, least_name, value)
                 bank.add(name, behaviour)
         return bank
 
 
 _PARTS = ("program", "known", "results")
+_LEAST = ("threshold", "least_similarity")
 
 
 def _codebooks(config: dict[str, Any]) -> Layout:
@@ -282,16 +286,15 @@ def _codebooks(config: dict[str, Any]) -> Layout:
 
 def _entry(name: str, behaviour: Behaviour) -> dict[str, Any]:
     entry = {"name": name, "report": behaviour.report.to_dict()}
-    if behaviour.threshold is not None:
-        entry |= {"threshold": behaviour.threshold}
+    entry |= {name: value for name in _LEAST if (value := getattr(behaviour, name)) is not None}
     if len(behaviour.space.sensors) < len(behaviour.space.schema.sensors):
         entry |= {"sensors": list(behaviour.space.sensors)}
     # A behaviour that is no sum has no terms to write.
     return entry | ({"terms": terms_to_dicts(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
 
 
-def _threshold(value: Any) -> float | None:
-    return None if value is None else as_float("threshold", value, -1)
+def _least(name: str, value: Any) -> float | None:
+    return None if value is None else as_float(name, value, -1)
 
 
 def check_name(name: object) -> None:

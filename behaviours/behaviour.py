@@ -23,13 +23,12 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.frozen import FrozenBehaviour
 from behaviours.memory import ResultMemory, check_levels
 from behaviours.ordered import distinct_rows
-from behaviours.recall import Recall, answer_cells, answer_conditions, familiarity
+from behaviours.recall import Recall, answer_cells, answer_conditions
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator, Sensor
 from behaviours.space import Space, check_addable
 from behaviours.storage import checksum
 from torchvsa import VSA, Readout, ShapeError
-from torchvsa._blocks import by_blocks
 from torchvsa._numerics import as_bipolar, is_integer
 from torchvsa.encoders.mirrored import mirrored
 
@@ -74,6 +73,8 @@ class Behaviour(Controller):
         """The name of the behaviour in its bank."""
         self.threshold: float | None = None
         """The familiarity that nearly all of the demonstrated conditions reach, see `calibrate`; None if unknown."""
+        self.least_similarity: float | None = None
+        """The similarity that nearly all of the demonstrated conditions reach, see `calibrate`; None if unknown."""
         self._terms = tuple(terms)
         if isinstance(program, nn.Parameter):
             self.register_parameter("program", program)
@@ -96,7 +97,7 @@ class Behaviour(Controller):
         if isinstance(self.program, nn.Parameter):
             program = nn.Parameter(program)
         moved = Behaviour(space, program, self.known.to(device), self.results.to(device), self.report, self._terms)
-        moved.threshold = self.threshold
+        moved.threshold, moved.least_similarity = self.threshold, self.least_similarity
         return moved
 
     @property
@@ -182,7 +183,7 @@ class Behaviour(Controller):
         learned = len(terms) == 1 and terms[0].weight == 1 and not terms[0].mirrored
         report = terms[0].report if learned else merged_report(terms)
         image = Behaviour(space, program, known, results, report, () if learned else terms)
-        image.threshold = self.threshold
+        image.threshold, image.least_similarity = self.threshold, self.least_similarity
         return image
 
     @property
@@ -226,11 +227,16 @@ class Behaviour(Controller):
         return same.to(torch.int8).argmax(-1)
 
     def calibrate(self, demonstrations: Demonstrations, quantile: float = 0.02) -> None:
-        """Set `threshold` to this quantile of the familiarity of the demonstrated conditions, each counted once."""
-        cells = distinct_rows(self.space.cells(demonstrations.sensors, demonstrations.episodes))[0]
-        row_bytes = 8 * self.space.vsa.dim
-        familiar = by_blocks(lambda rows: familiarity(self.space.encode(rows), self.known), cells, row_bytes=row_bytes)
-        self.threshold = float(familiar.double().quantile(quantile, interpolation="lower"))
+        """Set `threshold` and `least_similarity` from the demonstrated conditions, each counted once.
+
+        They are this quantile of the familiarity, and of the similarity of the result that is recalled.
+        """
+        with torch.no_grad():
+            recall = self.answer(distinct_rows(self.space.cells(demonstrations.sensors, demonstrations.episodes))[0])
+        self.threshold, self.least_similarity = (
+            float(values.double().quantile(quantile, interpolation="lower"))
+            for values in (recall.familiarity, recall.similarity)
+        )
 
     def trainable(self) -> "Behaviour":
         """A copy over the same space whose program is a float `nn.Parameter`, for a PyTorch training loop.

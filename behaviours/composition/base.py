@@ -1,7 +1,7 @@
 """The base class of policies that combine behaviours."""
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
 import torch
@@ -133,3 +133,12 @@ def threshold_of(part: Behaviour) -> float:
 
 
 _ROUNDING = 1e-6
+
+
+def half_similarity(part: Behaviour) -> float:
+    """Half of the similarity that nearly all of the behaviour's own conditions reach; 0 if that is unknown."""
+    return 0.5 * (part.least_similarity or 0.0)
+
+
+THRESHOLDS: dict[str, Callable[[Behaviour], float]] = {"familiarity": threshold_of, "similarity": half_similarity}
+"""From which value of a field of its `Recall` on a behaviour knows a condition."""

@@ -68,9 +68,7 @@ def check(settings: Damaged) -> None:
         raise ValueError(f"damage flips the signs of real numbers, of which {space.vsa.name} has none; try vsa=map_c")
     for name in settings.rows:
         if not line_of(name).codebooks or line_of(name).memory:
-            raise ValueError(
-                f"rows: damage cannot flip elements of {name}, which keeps no hypervectors or has a memory"
-            )
+            raise ValueError(f"rows: {name} cannot be damaged, since it keeps no hypervectors or has a memory")
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import functools
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 import pandas as pd
@@ -100,20 +101,22 @@ def familiarity(outcome: Outcome) -> Figure:
 
 def animations(page: Page, outcome: Outcome) -> None:
     """An animation of each policy on the same start, coloured by the behaviour that speaks."""
-    from sim import render
-
     found = {name: frame for name, frame in kept(outcome).items() if "speaker" in frame}
     if not found:
         return
     section = page.section("Who speaks")
     section.text("The same start in the arena large, at twice the speed; below each picture the behaviour that speaks.")
-    (outcome.folder / "animations").mkdir(exist_ok=True)
     for name, frame in found.items():
         path = frame.loc[frame.episode == ANIMATED]
-        file = outcome.folder / "animations" / f"{name}.gif"
-        speakers = path.speaker.replace("", "nobody").tolist()
-        render.animate_steps(steps_of(path), name, file, sim.find_arena("large"), speakers)
-        section.picture(file.read_bytes(), f"Animation of {name}", line_of(name).about)
+        draw = functools.partial(_animate, name, path)
+        section.animation(f"animation_{name}", draw, f"Animation of {name}", line_of(name).about)
+
+
+def _animate(name: str, path: pd.DataFrame, file: BinaryIO) -> None:
+    from sim import render
+
+    speakers = path.speaker.replace("", "nobody").tolist()
+    render.animate_steps(steps_of(path), name, file, sim.find_arena("large"), speakers)
 
 
 def _timeline(axes: Axes, name: str, path: pd.DataFrame) -> None:

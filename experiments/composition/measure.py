@@ -15,7 +15,7 @@ from rich.progress import Progress
 import sim
 from behaviours import Demonstrations, Policy
 from behaviours.learning import no_convergence_warnings
-from experiments.composition.rows import Line, Shown, demonstrated, line_of
+from experiments.composition.rows import Shown, demonstrated, line_of
 from experiments.kit import Cell, Row
 from experiments.kit.intervals import bootstrap, wilson
 from experiments.kit.store import write_frame
@@ -99,15 +99,21 @@ def measure(material: Material, cell: Cell) -> list[Row]:
     draws = range(settings.codebooks if line.codebooks else 1)
     with no_convergence_warnings():
         made = [line.make(material.shown, codebook) for codebook in draws]
+    together = EachAskedOnce(made) if all(map(AskedOnce.possible, made)) else None
+    drivers = made if together is None else [together]
+    asked = made if together is None else [together.alone(codebook) for codebook in draws]
+    # The moments first: robots meet most of their conditions again, and many are asked faster at once.
+    agreed = {name: [agreement(one, material.moments[name]) for one in asked] for name in settings.arenas}
     driving = settings if cell["engine"] == "vector" else replace(settings, engine="bullet", robots=None)
     found = []
     for name in settings.arenas:
         keep = name == PATHS_IN and cell["engine"] == "vector"
         count = starts(settings, cell, name)
-        runs = drive_each(driving, made, count, name, keep)
+        runs = drive_each(driving, drivers, count, name, keep)
         if keep:
             write_paths(material.folder, cell["row"], made, runs, count)
-        for codebook, run in zip(draws, runs, strict=True):
+        for codebook in draws:
+            run = runs[codebook % len(runs)]
             own = run.episode % len(draws) == codebook
             found.append(
                 {
@@ -116,17 +122,15 @@ def measure(material: Material, cell: Cell) -> list[Row]:
                     "episodes": int(own.sum()),
                     "successes": int(run.success[own].sum()),
                     "collisions": float(run.collisions[own].mean()) if own.any() else None,
-                    **(agreement(made[codebook], line, material.moments[name]) if cell["engine"] == "vector" else {}),
+                    **agreed[name][codebook],
                 }
             )
     return found
 
 
 def drive_each(settings: Composition, made: list[Any], starts: int, arena: str, record: bool) -> list[sim.Rollout]:
-    """For each controller a rollout that holds its episodes: start e drives with controller e mod their number."""
+    """A rollout for each controller: start e drives with controller e mod their number."""
     where = sim.find_arena(arena)
-    if all(map(AskedOnce.possible, made)):
-        return [corral.drive(settings, EachAskedOnce(made), range(starts), where, record)] * len(made)
     owned = [range(number, starts, len(made)) for number in range(len(made))]
     return [corral.drive(settings, one, own, where, record) for one, own in zip(made, owned, strict=True)]
 
@@ -138,7 +142,7 @@ def starts(settings: Composition, cell: Cell, arena: str) -> int:
     return settings.starts if arena in FULL else settings.other_starts
 
 
-def agreement(controller: Any, line: Line, moments: Moments) -> Row:
+def agreement(controller: Any, moments: Moments) -> Row:
     """The share of the teacher's moments with the teacher's commands: of all, of those in which it avoids, and by cell.
 
     `agreement_distinct` counts each condition once; `ceiling` is the best that a function of the bins could reach.
@@ -158,7 +162,7 @@ def write_paths(folder: Path, row: str, made: list[Any], runs: list[sim.Rollout]
     """Keep the first paths, with who spoke at each step and how well the condition was known."""
     paths = []
     for episode in range(min(PATHS, starts)):
-        controller, run = made[episode % len(made)], runs[episode % len(made)]
+        controller, run = made[episode % len(made)], runs[episode % len(runs)]
         steps = run.slice(episode)
         path = frame_of(steps).assign(episode=episode, success=bool(run.success[run.episode == episode][0]))
         if isinstance(controller, Policy):

@@ -27,6 +27,7 @@ from behaviours import (
     Space,
     Vote,
     WinnerTakesAll,
+    choosing,
 )
 from experiments.kit import parts
 from experiments.models.baselines import CLASSIFIERS, Classified
@@ -132,6 +133,12 @@ def masked_sum(shown: Shown, codebook: int) -> MotorSchema:
     return MotorSchema(shown.evident_bank(codebook, MASKS), loud, familiarity=False)
 
 
+def hierarchy_trained(shown: Shown, codebook: int) -> Hierarchy:
+    """One vector that also holds a program, trained on the moments of all behaviours, that recalls whom to ask."""
+    bank = shown.bank(codebook)
+    return Hierarchy(bank, choosing(bank, shown.apart, parts.rule(shown.settings.rule)))
+
+
 def paper_sum(shown: Shown, codebook: int) -> Behaviour:
     """The printed algorithms: each program clipped at every step, and so is their sum."""
     printed = shown.settings.paper
@@ -192,15 +199,22 @@ ROWS: dict[str, Line] = {
     ),
     "joint_program": Line(together, "one program learned from all demonstrations"),
     "evident_sum": Line(evident_sum, "a plain sum of programs learned apart, silent where only others know"),
-    "masked_priority": Line(masked(Priority), "each behaviour sees its own sensors; the first that knows speaks"),
+    "masked_priority": Line(
+        masked(lambda bank: Priority(bank, by="similarity")),
+        "each behaviour sees its own sensors; the first whose answer is clear speaks",
+    ),
     "masked_winner": Line(masked(WinnerTakesAll), "the same; the one that knows best speaks"),
     "masked_sum": Line(masked_sum, "the same; scores are added, those of seek louder"),
-    "behaviour_tree": Line(masked(BehaviourTree), "the same behaviours as leaves of a py_trees selector"),
+    "behaviour_tree": Line(
+        masked(lambda bank: BehaviourTree(bank, by="similarity")),
+        "the same behaviours as leaves of a py_trees selector; the last speaks where no answer is clear",
+    ),
     "plain_sum": Line(plain_sum, "the sum of programs that know nothing of each other"),
     "priority": Line(plain(Priority), "the first that knows the condition speaks"),
     "winner_takes_all": Line(plain(WinnerTakesAll), "the one that knows the condition best speaks"),
     "gated": Line(plain(Gated), "one vector, asked with the context of the one that knows best"),
     "hierarchy": Line(plain(Hierarchy), "one vector that also recalls whom to ask"),
+    "hierarchy_trained": Line(hierarchy_trained, "the same, with a trained program that recalls whom to ask"),
     "motor_schema": Line(plain(MotorSchema), "scores weighted by familiarity"),
     "blending": Line(plain(Blending), "commands weighted by familiarity"),
     "vote": Line(plain(Vote), "the majority of commands"),

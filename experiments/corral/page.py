@@ -108,10 +108,10 @@ def _corral(run: Run, page: Page) -> None:
     )
     names = [name for name in ("teacher", *run.programs[:1]) if name in shown]
     if run.outcome.settings.animate and len(names) == 2 and run.episode is not None:
-        path = run.outcome.folder / "rollout.gif"
-        render.animate([shown[name] for name in names], names, path, run.episode)
-        section.picture(
-            path.read_bytes(),
+        both = [shown[name] for name in names]
+        section.animation(
+            "rollout",
+            lambda path: render.animate(both, names, path, run.episode),
             f"Animation of teacher and {names[1]} driving out of the corral",
             f"Teacher and `{names[1]}` from held-out start {run.episode}. Both begin in the same place with the same "
             "wheel noise in store, and part as soon as one command differs.",

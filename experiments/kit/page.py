@@ -10,12 +10,14 @@ True
 from __future__ import annotations
 
 import base64
+import functools
+import io
 import re
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import jinja2
 import pandas as pd
@@ -24,6 +26,7 @@ from markupsafe import Markup, escape
 from behaviours.storage import write_atomically
 from experiments.kit.columns import Column, Table
 from experiments.kit.figures import drawn
+from experiments.kit.pool import measured
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -42,6 +45,16 @@ class Block:
     caption: str = ""
     alt: str = ""
     data: str = ""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture that is still to be drawn: its file's name, the function that returns its bytes, its data as CSV."""
+
+    name: str
+    file: str
+    draw: Callable[[], bytes]
+    table: str = ""
 
 
 @dataclass
@@ -69,35 +82,24 @@ class Section:
 
     def picture(self, content: bytes, alt: str, caption: str = "", data: str = "") -> None:
         """Add a PNG or a GIF (which plays); `alt` says in words what it shows. Raises `ValueError` for other bytes."""
-        mime = _MIME.get(content[:4])
-        if mime is None:
-            raise ValueError(f"picture {alt!r} starts with {content[:4]!r}; a page holds PNG and GIF only")
-        self.page.pictures += 1
-        image = self.page.pictures, f"data:{mime};base64,{base64.b64encode(content).decode()}"
-        self.blocks.append(Block("picture", image, caption, alt, data))
+        self.blocks.append(self.page.picture(content, alt, caption, data))
 
     def figure(
         self, name: str, draw: Callable[[], Figure], alt: str, caption: str = "", data: pd.DataFrame | None = None
     ) -> None:
-        """Draw a figure, keep it as `figures/{name}.png`, with its `data` as CSV, and show both.
+        """Add a figure that `draw` draws; it is kept as `figures/{name}.png`, with its `data` as CSV.
 
-        A figure that cannot be drawn costs nothing else: the page says why, and `page.failures` holds the traceback.
+        It is drawn by `Page.draw`. One that cannot be drawn costs nothing else: the page says why, and `page.failures`
+        holds the traceback.
         """
-        try:
-            content = drawn(draw)
-        except Exception as error:  # whatever it is, the results are worth more than one picture
-            self.page.failures[name] = traceback.format_exc()
-            self.text(f"The figure `{name}` could not be drawn: {type(error).__name__}: {error}")
-            return
         table = "" if data is None else data.to_csv(index=False)
-        if self.page.folder is not None:
-            figures = self.page.folder / "figures"
-            figures.mkdir(exist_ok=True)
-            write_atomically(figures / f"{name}.png", content)
-            if table:
-                write_atomically(figures / f"{name}.csv", table.encode())
-        link = f"data:text/csv;base64,{base64.b64encode(table.encode()).decode()}" if table else ""
-        self.picture(content, alt, caption, link)
+        drawing = Drawing(name, f"{name}.png", functools.partial(drawn, draw), table)
+        self.blocks.append(Block("drawing", drawing, caption, alt))
+
+    def animation(self, name: str, draw: Callable[[BinaryIO], None], alt: str, caption: str = "") -> None:
+        """Add a GIF that `draw` writes to an open file; it is kept as `figures/{name}.gif`, see `figure`."""
+        drawing = Drawing(name, f"{name}.gif", functools.partial(_written, draw))
+        self.blocks.append(Block("drawing", drawing, caption, alt))
 
     def code(self, text: str, caption: str = "") -> None:
         """Add text to be copied: a command, settings."""
@@ -124,8 +126,47 @@ class Page:
         self.sections.append(section)
         return section
 
+    def draw(self, workers: int = 1) -> None:
+        """Draw all figures and animations that are still to be drawn, with so many processes."""
+        waiting = [
+            (section, place, block.content)
+            for section in self.sections
+            for place, block in enumerate(section.blocks)
+            if isinstance(block.content, Drawing)
+        ]
+        draws = [drawing.draw for _, _, drawing in waiting]
+        # Another process takes as long to start as two figures to draw.
+        workers = min(workers, -(-len(draws) // 2))
+        found = dict(measured(_bytes_or_error, draws, range(len(draws)), workers)) if draws else {}
+        for number, (section, place, drawing) in enumerate(waiting):
+            section.blocks[place] = self._drawn(section.blocks[place], drawing, *found[number])
+
+    def _drawn(self, block: Block, drawing: Drawing, content: bytes, error: str, trace: str) -> Block:
+        """The picture that was drawn, kept in the folder; or why there is none."""
+        if error:
+            self.failures[drawing.name] = trace
+            return Block("text", f"The figure `{drawing.name}` could not be drawn: {error}")
+        if self.folder is not None:
+            figures = self.folder / "figures"
+            figures.mkdir(exist_ok=True)
+            write_atomically(figures / drawing.file, content)
+            if drawing.table:
+                write_atomically(figures / f"{drawing.name}.csv", drawing.table.encode())
+        link = f"data:text/csv;base64,{base64.b64encode(drawing.table.encode()).decode()}" if drawing.table else ""
+        return self.picture(content, block.alt, block.caption, link)
+
+    def picture(self, content: bytes, alt: str, caption: str = "", data: str = "") -> Block:
+        """A block that shows a PNG or a GIF. Raises `ValueError` for other bytes."""
+        mime = _MIME.get(content[:4])
+        if mime is None:
+            raise ValueError(f"picture {alt!r} starts with {content[:4]!r}; a page holds PNG and GIF only")
+        self.pictures += 1
+        image = self.pictures, f"data:{mime};base64,{base64.b64encode(content).decode()}"
+        return Block("picture", image, caption, alt, data)
+
     def html(self) -> str:
-        """The page as text; whatever was given is escaped."""
+        """The page as text, with all figures drawn; whatever was given is escaped."""
+        self.draw()
         environment = jinja2.Environment(
             loader=jinja2.FileSystemLoader(Path(__file__).parent),
             autoescape=True,
@@ -139,6 +180,21 @@ class Page:
     def write(self, path: Path) -> Path:
         """Write the page, whole or not at all."""
         return write_atomically(path, self.html().encode())
+
+
+def _written(draw: Callable[[BinaryIO], None]) -> bytes:
+    """What `draw` writes to a file."""
+    buffer = io.BytesIO()
+    draw(buffer)
+    return buffer.getvalue()
+
+
+def _bytes_or_error(draws: Sequence[Callable[[], bytes]], number: int) -> tuple[bytes, str, str]:
+    """What one of them draws; or the error, and its traceback."""
+    try:
+        return draws[number](), "", ""
+    except Exception as error:  # whatever it is, the results are worth more than one picture
+        return b"", f"{type(error).__name__}: {error}", traceback.format_exc()
 
 
 def _inline(text: str) -> Markup:

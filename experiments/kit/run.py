@@ -85,6 +85,7 @@ def draw(study: Study, outcome: Outcome, console: Console) -> Page:
         f"Run on {date} on {host} ({outcome.provenance['platform']}), commit {commit or 'unknown'}; {versions}."
     )
     section.code(OmegaConf.to_yaml(OmegaConf.create(outcome.config)), "All settings of this run:")
+    page.draw(outcome.settings.workers)
     page.write(outcome.folder / "report.html")
     for name, trace in page.failures.items():
         console.print(f"figure {name} could not be drawn: {trace.splitlines()[-1]}", markup=False, soft_wrap=True)

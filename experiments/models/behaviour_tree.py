@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Literal
 
 import torch
 from jaxtyping import Shaped
@@ -13,6 +14,7 @@ from py_trees.trees import BehaviourTree as Tree
 from torch import Tensor
 
 from behaviours import BehaviourBank, Policy, Recall
+from behaviours.composition.base import THRESHOLDS
 
 
 class _Leaf(behaviour.Behaviour):
@@ -30,14 +32,15 @@ class _Leaf(behaviour.Behaviour):
 class BehaviourTree(Policy):
     """A selector over the behaviours: the first that knows the condition succeeds, and speaks.
 
-    The last one speaks without being asked whether it knows. A condition is known from a familiarity of
-    `Behaviour.threshold` on.
+    The last one speaks without being asked whether it knows. A condition is known as in `Priority`, by default if it is
+    familiar.
 
     Source: Colledanchise and Ögren 2018, "Behavior trees in robotics and AI"; py_trees 2.6.
     """
 
-    def __init__(self, bank: BehaviourBank) -> None:
+    def __init__(self, bank: BehaviourBank, by: Literal["familiarity", "similarity"] = "familiarity") -> None:
         super().__init__(bank, bank.names)
+        self._by, self._limits = by, [THRESHOLDS[by](part) for part in self.parts]
         last = len(self.names) - 1
         self._leaves = [_Leaf(name, number, number == last) for number, name in enumerate(self.names)]
         self._tree = Tree(Selector("who", memory=False, children=self._leaves))
@@ -45,9 +48,8 @@ class BehaviourTree(Policy):
     def query(self, conditions: Sequence[Shaped[Tensor, "batch d"]]) -> Recall:
         """See `Policy.query`."""
         answers = self.answers(conditions)
-        limits = [0.0 if part.threshold is None else part.threshold for part in self.parts]
-        familiar = torch.stack([recall.familiarity for recall in answers], 1)
-        patterns, index = (familiar >= torch.tensor(limits)).unique(dim=0, return_inverse=True)
+        found = torch.stack([getattr(recall, self._by) for recall in answers], 1)
+        patterns, index = (found >= torch.tensor(self._limits)).unique(dim=0, return_inverse=True)
         speakers = torch.tensor([self._tick(pattern) for pattern in patterns.tolist()])
         return self.spoken(answers, speakers[index])
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -77,6 +77,10 @@ class EachAskedOnce:
             self._found[new] = self._keep(controller.answer(space.seen(asked)))
         assert self._answers is not None
         return self._answers.rows(torch.from_numpy(self._found[number])), which
+
+    def alone(self, number: int) -> Callable[[NDArray[np.float64]], Recall]:
+        """One of the controllers, as a function of readings."""
+        return lambda readings: self.step(readings, np.full(len(readings), number))[0]
 
     def _keep(self, answer: Recall) -> NDArray[np.int64]:
         """Keep these answers; returns their numbers."""

@@ -56,6 +56,7 @@ def test_all_forms_of_a_behaviour_use_the_same_sensors(tmp_path: Path) -> None:
             assert all(same_bits(a, b) for a, b in zip(made[name]([row.tolist()])[:4], tick[:4], strict=True))
         assert loaded[name].space.sensors == made[name].space.sensors
         assert loaded[name].threshold == made[name].threshold
+        assert loaded[name].least_similarity == made[name].least_similarity is not None
 
 
 @pytest.mark.parametrize("policy", [Priority, WinnerTakesAll, MotorSchema])
@@ -95,14 +96,12 @@ def test_unknown_sensors_are_named() -> None:
 def test_a_threshold_is_what_nearly_all_of_its_own_conditions_reach() -> None:
     made, shown = BehaviourBank(space(1000)), random_pairs(60)
     made.learn("x", shown, OneShot())
-    familiar = made["x"](shown.sensors).familiarity
-    threshold = made["x"].threshold
-    assert threshold is not None
-    assert 0.97 <= (familiar >= threshold - 1e-6).double().mean() < 1
+    recall, before = made["x"](shown.sensors), made["x"]
     made.partial_fit("x", random_pairs(5, seed=8), OneShot(novelty="similarity"))
-    later = made["x"].threshold
-    assert later is not None
-    assert later <= threshold
+    for reached, field in ((recall.familiarity, "threshold"), (recall.similarity, "least_similarity")):
+        least = getattr(before, field)
+        assert 0.97 <= (reached >= least - 1e-6).double().mean() < 1
+        assert getattr(made["x"], field) <= least
 
 
 def test_what_a_robot_runs_is_recognised_by_the_sensors_of_each_behaviour() -> None:

@@ -18,6 +18,7 @@ from behaviours import (
     Gradient,
     LeastSquares,
     OneShot,
+    Priority,
     Rule,
     Sequencing,
     Silence,
@@ -48,6 +49,25 @@ def test_a_rule_is_silent_where_only_others_know(rule: Rule) -> None:
     # What it was shown itself does not become silent by being shown to others, too.
     bank.learn("shared", own, rule, silent=shown)
     assert torch.equal(bank["shared"].program, bank["own"].program)
+
+
+def test_priority_by_similarity_lets_each_speak_where_it_is_not_silent() -> None:
+    bank, shown = BehaviourBank(space(2048, protection="none")), random_pairs(45)
+    parts = {name: shown.where([number % 3 == of for number in range(45)]) for of, name in enumerate("abc")}
+    bank.learn_apart(parts, BOTH[0])
+    policy, recalls = Priority(bank, ["c", "a", "b"], by="similarity"), bank(shown.sensors)
+    for name, least in zip(policy.names, policy.thresholds, strict=True):
+        assert least == pytest.approx(
+            0.5 * np.quantile(bank[name](parts[name].sensors).similarity, 0.02, method="lower")
+        )
+    speaker = policy(shown.sensors).speaker
+    assert speaker is not None
+    for row, number in enumerate(speaker.tolist()):
+        above = [float(recalls[n].similarity[row]) - t for n, t in zip("cab", policy.thresholds, strict=True)]
+        assert number == next((i for i, lead in enumerate(above) if lead >= 0), int(np.argmax(above)))
+        assert policy.names[number] == "abc"[row % 3]
+    with pytest.raises(ValueError, match="expected one of 'familiarity', 'similarity'"):
+        Priority(bank, by="margin")  # pyright: ignore[reportArgumentType] # what a file could hold
 
 
 @pytest.mark.parametrize("rule", BOTH, ids=lambda rule: rule.name)

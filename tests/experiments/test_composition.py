@@ -11,15 +11,16 @@ from rich.console import Console
 
 import sim
 from behaviours import BehaviourBank, Demonstrations, OneShot, Priority
-from experiments.composition import study
+from experiments.composition import damage, study
 from experiments.composition.measure import distinct
-from experiments.composition.rows import MASKS, ROWS, Shown
+from experiments.composition.rows import MASKS, ROWS, Shown, line_of
 from experiments.kit.run import check_all, run
 from experiments.models.behaviour_tree import BehaviourTree
 from experiments.tasks import corral
 from experiments.tasks.asked_once import EachAskedOnce
+from experiments.tasks.behaviours import BEHAVIOURS, Precedence
 
-SMALL = ("vsa.dim=512", "demonstrations=6", "heldout=3", "codebooks=2", "seconds=25")
+SMALL = ("vsa.dim=512", "demonstrations=6", "heldout=3", "codebooks=2", "seconds=12")
 
 
 def shown() -> Shown:
@@ -97,17 +98,86 @@ def test_each_start_drives_with_its_own_codebook() -> None:
         assert torch.equal(commands[codebook::2], own)
 
 
+def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path) -> None:
+    def retreat(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return readings[:, 2] < 0.06, np.tile([-1.0, -0.5], (len(readings), 1))
+
+    BEHAVIOURS.register("retreat", retreat)
+    settings = composed(
+        study, *SMALL, "behaviours=[retreat,seek_light,avoid,cruise]", "rows=[teacher,sequencing]",
+        "bullet_rows=[]", "arenas=[large]", "starts=5", "seconds=8", "workers=1",
+    )  # fmt: skip
+    outcome = run(study, settings, tmp_path, Console(quiet=True))
+    rows = {row["row"]: row for row in outcome.table}
+    assert rows["teacher"]["agreement"] == 1.0
+    assert rows["sequencing"]["starts"] == 5
+    assert (tmp_path / "figures" / "animation_sequencing.gif").is_file()
+    spoken = set(pd.read_parquet(tmp_path / "paths" / "sequencing.parquet").speaker)
+    assert spoken <= {"retreat", "seek_light", "avoid", "cruise"}
+    near, far = [[9.0, 9.0, 0.01]], [[9.0, 9.0, 1.0]]
+    rules = Precedence(settings.behaviours)
+    assert rules(np.array(near)).tolist() == [[-1.0, -0.5]]
+    assert rules(np.array(far)).tolist() == sim.Teacher()(np.array(far)).tolist()
+    assert Precedence(["avoid"])(np.array(far)).tolist() == [[0.0, 0.0]]
+
+
+def test_rows_with_a_memory_are_not_asked_once_for_all() -> None:
+    assert line_of("sequencing").memory
+    assert not line_of("bundle").memory
+    with pytest.raises(ValueError, match="cannot be damaged"):
+        check_all(damage.study, composed(damage.study, "rows=[sequencing]"))
+    with pytest.raises(ValueError, match="nearest_neighbour cannot be damaged"):
+        check_all(damage.study, composed(damage.study, "rows=[nearest_neighbour]"))
+
+
+def test_flipped_elements_are_counted_in_all_vectors_of_a_row() -> None:
+    what = shown()
+    for name, count in (("joint_program", 1), ("plain_sum", 1), ("gated", 4), ("masked_priority", 6)):
+        made = ROWS[name].make(what, 0)
+        copy = damage.flipped(made, 0.25, (0, 1))
+        before, after = (torch.stack(damage.vectors(one)).double() for one in (made, copy))
+        assert before.shape == (count, 512)
+        changed = (before != after).flatten()
+        assert torch.equal(after.flatten()[changed], -before.flatten()[changed])
+        hit = damage.flipped(made, 1.0, (0, 1))
+        assert torch.equal(torch.stack(damage.vectors(hit)).double(), -before)
+        # Elements of 0 are flipped, too, which nobody sees.
+        assert 0 < changed.sum() <= round(0.25 * before.numel())
+
+
+def test_damage_leaves_less(tmp_path: Path) -> None:
+    settings = composed(
+        damage.study, "vsa.dim=512", "demonstrations=6", "heldout=4", "codebooks=2", "seconds=12", "workers=1",
+        "rows=[joint_program,plain_sum]", "flips=[0.1,0.5]", "noise=[0.2]", "starts=6",
+    )  # fmt: skip
+    outcome = run(damage.study, settings, tmp_path, Console(quiet=True))
+    found = {(row["row"], row["damage"], row["level"]): row for row in outcome.table}
+    assert len(found) == 2 * (3 + 2)
+    for name in settings.rows:
+        whole = found[name, damage.FLIPPED, 0.0]
+        assert whole["agreement"] == found[name, damage.NOISY, 0.0]["agreement"]
+        assert found[name, damage.FLIPPED, 0.1]["agreement"] > found[name, damage.FLIPPED, 0.5]["agreement"]
+        assert found[name, damage.NOISY, 0.2]["agreement"] < whole["agreement"]
+        assert found[name, damage.FLIPPED, 0.5]["kept"] == pytest.approx(
+            found[name, damage.FLIPPED, 0.5]["agreement"] / whole["agreement"]
+        )
+    assert (tmp_path / "figures" / "damage.png").is_file()
+    assert "each row survives flipped elements: `joint_program`" in damage.study.headline(outcome)
+
+
 def test_a_behaviour_tree_is_a_priority() -> None:
     what = shown()
     bank = what.evident_bank(0, MASKS)
     readings = what.train.sensors[::7]
-    tree, priority = BehaviourTree(bank)(readings), Priority(bank)(readings)
-    limits = [part.threshold or 0 for part in Priority(bank).parts]
-    familiar = np.stack([bank[name](readings).familiarity.numpy() for name in bank], 1)
-    clear = (np.abs(familiar - limits) > 1e-5).all(1) & (familiar >= limits).any(1)
-    assert tree.speaker is not None
-    assert priority.speaker is not None
-    assert tree.speaker.numpy()[clear].tolist() == priority.speaker.numpy()[clear].tolist()
+    for by in ("familiarity", "similarity"):
+        tree, priority = BehaviourTree(bank, by)(readings), Priority(bank, by=by)
+        found = np.stack([getattr(bank[name](readings), by).numpy() for name in bank], 1)
+        known = (found >= np.array(priority.thresholds)).any(1)
+        assert known.sum() > 20
+        assert tree.speaker is not None
+        speaker = priority(readings).speaker
+        assert speaker is not None
+        assert tree.speaker.numpy()[known].tolist() == speaker.numpy()[known].tolist()
 
 
 def test_a_tree_lets_the_last_one_speak_where_nobody_knows() -> None:

@@ -1,10 +1,15 @@
 """The page of a study: safe, self-contained, and drawn from what it is given."""
 
 import base64
+import functools
 import io
+from pathlib import Path
+from typing import BinaryIO
 
+import pandas as pd
 import pytest
 from elements import Elements
+from matplotlib.figure import Figure
 from PIL import Image
 
 from experiments.kit import Column, Page, Table
@@ -79,3 +84,37 @@ def test_the_best_of_those_that_compete_is_marked_where_they_compare() -> None:
     assert marks(rate, [*ROWS[:2], {**ROWS[2], "starts": 99}]) == ["", "", "bad"]
     assert marks(Column("time", best="min"), ROWS) == ["best", "", ""]
     assert [cell.text for cell in Column("time", format=".1f").cells(ROWS)] == ["5.0", "9.0", "-"]
+
+
+def test_pictures_are_drawn_alike_by_any_number_of_processes(tmp_path: Path) -> None:
+    def fails() -> Figure:
+        raise RuntimeError("no ink")
+
+    def page(folder: Path, workers: int) -> Page:
+        folder.mkdir()
+        made = Page("t", folder=folder)
+        section = made.section("s")
+        for number in range(3):
+            data = pd.DataFrame({"x": [number]})
+            section.figure(f"line{number}", functools.partial(line, number), "a line", data=data)
+        section.figure("broken", fails, "nothing")
+        section.animation("moving", moves, "moves")
+        made.draw(workers)
+        return made
+
+    def moves(file: BinaryIO) -> None:
+        file.write(b"GIF89a and more")
+
+    def line(slope: float) -> Figure:
+        figure = Figure(figsize=(1, 1))
+        figure.subplots().plot([0, slope])
+        return figure
+
+    one, two = page(tmp_path / "one", 1), page(tmp_path / "two", 2)
+    assert one.html() == two.html()
+    assert "The figure <code>broken</code> could not be drawn: RuntimeError: no ink" in one.html()
+    assert list(one.failures) == ["broken"]
+    names = {path.name for path in (tmp_path / "two" / "figures").iterdir()}
+    assert names == {"line0.png", "line0.csv", "line1.png", "line1.csv", "line2.png", "line2.csv", "moving.gif"}
+    assert (tmp_path / "one" / "figures" / "moving.gif").read_bytes() == b"GIF89a and more"
+    assert b"GIF89a and more" in embedded(one.html())

@@ -39,7 +39,7 @@ def test_the_page_needs_nothing_else(full: Path) -> None:
 def test_every_picture_decodes_and_lies_in_the_folder(full: Path) -> None:
     embeds = embedded((full / "report.html").read_text())
     pictures = [content for content in embeds if content.startswith((b"\x89PNG", b"GIF8"))]
-    files = [*(full / "figures").glob("*.png"), full / "rollout.gif"]
+    files = [*(full / "figures").glob("*.png"), full / "figures" / "rollout.gif"]
     assert sorted(pictures) == sorted(file.read_bytes() for file in files)
     assert len(pictures) == 6
     data = [*(full / "figures").glob("*.csv")]
@@ -75,7 +75,6 @@ def drawn_with(folder: Path, *names: str, **changed: object) -> str:
     """The page of the full run with only these controllers, drawn from a copy of its folder."""
     shutil.copytree(full_run().folder, folder, dirs_exist_ok=True)
     shutil.rmtree(folder / "figures")
-    (folder / "rollout.gif").unlink()
     study, outcome = load(folder)
     outcome.settings.controllers = list(names)
     for name, value in changed.items():
@@ -94,13 +93,13 @@ def test_any_subset_of_controllers_has_its_sections(names: tuple[str, ...], tmp_
     headings = [attrs for tag, attrs in seen.tags if tag == "section"]
     assert len(headings) == len(wanted)
     assert wanted <= set(seen.words)
-    assert (tmp_path / "rollout.gif").exists() == ("teacher" in names and "timeline" in SECTIONS[names])
+    assert (tmp_path / "figures" / "rollout.gif").exists() == ("teacher" in names and "timeline" in SECTIONS[names])
     assert any("wheels on a floor" in word for word in seen.words) == ("teacher_wheeled" in names)
 
 
 def test_the_animation_can_be_left_out(tmp_path: Path) -> None:
     assert "Animation of teacher" not in drawn_with(tmp_path, "teacher", "hand_written", animate=False)
-    assert not (tmp_path / "rollout.gif").exists()
+    assert not (tmp_path / "figures" / "rollout.gif").exists()
 
 
 def test_the_same_settings_give_the_same_bytes(tmp_path: Path) -> None:
@@ -108,7 +107,7 @@ def test_the_same_settings_give_the_same_bytes(tmp_path: Path) -> None:
         small_run(tmp_path / name, "controllers=[teacher,hand_written]")
     files = [path.relative_to(tmp_path / "first") for path in (tmp_path / "first").rglob("*.*") if path.is_file()]
     names = {path.as_posix() for path in files}
-    assert {"figures/success.png", "figures/trajectories.png", "figures/timelines.png", "rollout.gif"} <= names
+    assert {"figures/success.png", "figures/trajectories.png", "figures/timelines.png", "figures/rollout.gif"} <= names
     # Those with times of the clock in them.
     timed = {"report.html", "results.json", "records.parquet", "cells.jsonl", "figures/success.csv"}
     for name in names - timed:

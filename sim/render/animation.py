@@ -1,7 +1,4 @@
-"""Pictures of rollouts: the corral from above, trajectories, and animations of several robots side by side.
-
-`import sim` does not import this module, which needs matplotlib: write `from sim import render`.
-"""
+"""Animations: the path of one episode of several robots side by side, as a GIF."""
 
 from __future__ import annotations
 
@@ -9,19 +6,17 @@ import io
 import math
 import os
 import tempfile
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import BinaryIO
 
 import matplotlib
 import matplotlib.colors
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.lines import Line2D
-from matplotlib.patches import Circle, Rectangle
 from PIL import Image, ImageDraw, ImageFont
 
 from sim.arena import Arena
+from sim.render.pictures import COLOURS, INK, LAMPS, PAPER, WALL, extent
 from sim.result import Rollout, Steps
 from sim.robot import CONTROL_HZ, RADIUS
 from sim.sensors import DISTANCE_MAX, LIGHT_MAX
@@ -29,78 +24,15 @@ from sim.shapes import Box
 from sim.task import Task
 from sim.teachers import BEHAVIOURS, InOrder
 
-WALL, INK, PAPER = "#3d4654", "#22272f", "#ffffff"
-LAMPS = {"yellow": "#f5b400", "blue": "#2f6fd0", "red": "#d03a3a"}
-"""Lamps by their colour; others are white."""
-COLOURS = {"seek_light": "#e07b00", "avoid": "#c8324b", "cruise": "#3f74b5"}
-"""The colour of each of the teacher's behaviours."""
-
-
-def draw_corral(ax: Axes, arena: Arena) -> None:
-    """Draw walls and lamp from above into `ax`, in m, with equal scales and without a frame."""
-    for shape in arena.obstacles:
-        if isinstance(shape, Box):
-            corner, width, height = (shape.x - shape.half_x, shape.y - shape.half_y), 2 * shape.half_x, 2 * shape.half_y
-            ax.add_patch(Rectangle(corner, width, height, color=WALL, lw=0, zorder=2))
-        else:
-            ax.add_patch(Circle((shape.x, shape.y), shape.radius, color=WALL, lw=0, zorder=2))
-    for lamp in arena.lamps:
-        for scale, alpha in ((3.2, 0.10), (2.2, 0.16), (1.5, 0.25), (1.0, 1.0)):
-            colour, radius = LAMPS.get(lamp.colour, PAPER), scale * lamp.radius
-            ax.add_patch(Circle((lamp.x, lamp.y), radius, color=colour, alpha=alpha, lw=0, zorder=1))
-    left, right, bottom, top = _extent(arena)
-    ax.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", xticks=[], yticks=[])
-    ax.set_axis_off()
-
-
-def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = None, legend: bool = True) -> None:
-    """Draw a corral and trajectories, coloured by the behaviour that the teacher would choose.
-
-    A hollow dot marks each start; a cross marks the end of an episode without success.
-
-    Args:
-        ax: where to draw.
-        rollout: a recorded rollout.
-        episodes: the episodes to draw; by default the first 12.
-        legend: whether to explain colours and marks under the picture.
-
-    Raises:
-        KeyError: an episode is missing, or the rollout has no trajectories.
-    """
-    draw_corral(ax, rollout.arena)
-    for episode in rollout.episode[:12].tolist() if episodes is None else episodes:
-        path = rollout.slice(episode)
-        points = np.stack([path.x, path.y], axis=1)
-        pieces = np.stack([points[:-1], points[1:]], axis=1)
-        rules = InOrder(rollout.task).rule(path.sensors, path.goal)
-        colours = [_COLOUR_OF_RULE[rule] for rule in rules[:-1].tolist()]
-        ax.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.1, alpha=0.75, zorder=3))
-        # A robot that avoids an obstacle turns on the spot, which a line does not show.
-        turns = points[rules == _AVOID]
-        ax.scatter(turns[:, 0], turns[:, 1], s=9, color=COLOURS["avoid"], lw=0, zorder=4)
-        ax.plot(*points[0], "o", ms=5, mfc=PAPER, mec=INK, mew=1.2, zorder=5)
-        if not rollout.success[rollout.episode == episode][0]:
-            ax.plot(*points[-1], "X", ms=8, mfc=COLOURS["avoid"], mec=PAPER, mew=0.8, zorder=6)
-    if legend:
-        handles = [Line2D([], [], color=colour, lw=2, label=name.replace("_", " ")) for name, colour in COLOURS.items()]
-        handles.append(Line2D([], [], ls="", marker="o", ms=5, mfc=PAPER, mec=INK, label="start"))
-        handles.append(
-            Line2D([], [], ls="", marker="X", ms=7, mfc=COLOURS["avoid"], mec=PAPER, label="did not succeed")
-        )
-        ax.legend(
-            handles=handles, loc="upper center", bbox_to_anchor=(0.5, 0.02), ncols=5, fontsize=8, frameon=False,
-            handlelength=1.4, columnspacing=1.2,
-        )  # fmt: skip
-
 
 def animate(
     rollouts: Sequence[Rollout],
     titles: Sequence[str],
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | BinaryIO,
     episode: int | None = None,
     speed: float = 2.0,
     frames: int = 150,
-) -> Path:
+) -> None:
     """Write a GIF of one episode of several rollouts side by side, with trails and the time.
 
     Shows the robot's outline, its lit light sensors and its distance beam, from the recorded readings. The file is
@@ -109,7 +41,7 @@ def animate(
     Args:
         rollouts: recorded rollouts in the same arena.
         titles: one per rollout.
-        path: the file to write; its folder must exist.
+        path: the file to write, whose folder must exist; or an open binary file.
         episode: its number; by default the one of median length among those that succeed in the most rollouts.
         speed: playback speed relative to real time.
         frames: maximum number of frames; a longer episode is drawn in larger steps.
@@ -122,30 +54,30 @@ def animate(
         raise ValueError(f"{len(rollouts)} rollouts and {len(titles)} titles; expected one title per rollout")
     if len({rollout.arena for rollout in rollouts}) > 1:
         raise ValueError("the rollouts are from different arenas; expected one arena")
-    chosen = _typical(rollouts) if episode is None else episode
+    chosen = typical(rollouts) if episode is None else episode
     panels = [
         _Panel(rollout.slice(chosen), title, rollout.arena, rollout.task)
         for rollout, title in zip(rollouts, titles, strict=True)
     ]
-    return _write_gif(panels, Path(path), speed, frames)
+    _write_gif(panels, path, speed, frames)
 
 
 def animate_steps(
     steps: Steps,
     title: str,
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | BinaryIO,
     arena: Arena,
     speakers: Sequence[str],
     task: Task | None = None,
     speed: float = 2.0,
     frames: int = 150,
-) -> Path:
+) -> None:
     """Write a GIF of the recorded steps of one episode, as `animate` does, with the behaviour that speaks at each.
 
     Args:
         steps: the control steps.
         title: written above the picture.
-        path: the file to write; its folder must exist.
+        path: the file to write, whose folder must exist; or an open binary file.
         arena: where the robot drove.
         speakers: a name for each step: what is written below the picture, and says the colour (see `COLOURS`).
         task: says what the columns of the readings are; by default that of the arena.
@@ -158,10 +90,10 @@ def animate_steps(
     if len(steps) != len(speakers) or not len(steps):
         raise ValueError(f"{len(steps)} steps and {len(speakers)} speakers; expected one speaker per step")
     panel = _Panel(steps, title, arena, Task.of(arena) if task is None else task, speakers)
-    return _write_gif([panel], Path(path), speed, frames)
+    _write_gif([panel], path, speed, frames)
 
 
-def _write_gif(panels: Sequence[_Panel], path: Path, speed: float, frames: int) -> Path:
+def _write_gif(panels: Sequence[_Panel], path: str | os.PathLike[str] | BinaryIO, speed: float, frames: int) -> None:
     if speed <= 0 or frames < 1:
         raise ValueError(f"speed={speed}, frames={frames}; expected a speed above 0 and at least 1 frame")
     length = max(len(panel) for panel in panels)
@@ -177,10 +109,13 @@ def _write_gif(panels: Sequence[_Panel], path: Path, speed: float, frames: int) 
         buffer, "GIF", save_all=True, append_images=images[1:], loop=0, optimize=False,
         duration=[delay] * (len(images) - 1) + [1500],
     )  # fmt: skip
-    return _write(path, buffer.getvalue())
+    if isinstance(path, str | os.PathLike):
+        _write(Path(path), buffer.getvalue())
+    else:
+        path.write(buffer.getvalue())
 
 
-def _typical(rollouts: Sequence[Rollout]) -> int:
+def typical(rollouts: Sequence[Rollout]) -> int:
     """The episode of median length among the common ones that succeed in the most rollouts."""
     common = sorted(set.intersection(*(set(rollout.episode.tolist()) for rollout in rollouts)))
     if not common:
@@ -196,21 +131,7 @@ def _typical(rollouts: Sequence[Rollout]) -> int:
     return lengths[(len(lengths) - 1) // 2][1]
 
 
-def _extent(arena: Arena) -> tuple[float, float, float, float]:
-    """What a picture shows: everything, with room for the lamps' light."""
-    left, right, bottom, top = arena.extent()
-    room = [
-        (lamp.x + side * 2.2 * lamp.radius, lamp.y + side * 2.2 * lamp.radius)
-        for lamp in arena.lamps
-        for side in (-1, 1)
-    ]
-    x, y = zip(*room, strict=True)
-    return min(left, *x) - 0.2, max(right, *x) + 0.2, min(bottom, *y) - 0.2, max(top, *y) + 0.2
-
-
-_COLOUR_OF_RULE = {rule: COLOURS[name] for name, rules in BEHAVIOURS.items() for rule in rules}
 _BEHAVIOUR_OF_RULE = {rule: name for name, rules in BEHAVIOURS.items() for rule in rules}
-(_AVOID,) = BEHAVIOURS["avoid"]
 
 
 class _Panel:
@@ -228,7 +149,7 @@ class _Panel:
         self._speakers = list(speakers)
         self._colours = [COLOURS.get(name, INK) for name in self._speakers]
         self._lights = [task.pair(task.goals[goal]) for goal in path.goal.tolist()]
-        left, right, bottom, top = _extent(arena)
+        left, right, bottom, top = extent(arena)
         self._scale = self._WIDTH * self._FINE / (right - left)
         self._origin = left, top
         size = self._WIDTH * self._FINE, round((top - bottom) * self._scale)
@@ -326,7 +247,7 @@ def _font(size: int, bold: bool = False) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name, size)
 
 
-def _write(path: Path, content: bytes) -> Path:
+def _write(path: Path, content: bytes) -> None:
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     try:
         with os.fdopen(handle, "wb") as file:
@@ -336,4 +257,3 @@ def _write(path: Path, content: bytes) -> Path:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-    return path
