@@ -13,7 +13,7 @@ from behaviours import Bundle
 from experiments.composition import sums
 from experiments.composition.interference import study
 from experiments.composition.measure import agreement
-from experiments.composition.rows import ROWS, Shown
+from experiments.composition.rows import Shown
 from experiments.kit.run import check_all, run
 from experiments.tasks import corral
 
@@ -73,7 +73,7 @@ def test_agreement_is_that_of_the_study_of_composition(given: sums.Material) -> 
     asked = sums.Questions(given, 1)
     bank = given.shown.bank(1)
     shares = asked.shares(asked.right(sums.added(bank)))
-    wanted = agreement(Bundle(bank), ROWS["plain_sum"], given.moments)
+    wanted = agreement(Bundle(bank), given.moments)
     assert {key: shares[key] for key in wanted if key != "ceiling"} == {
         key: value for key, value in wanted.items() if key != "ceiling"
     }
