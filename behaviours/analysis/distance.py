@@ -19,7 +19,7 @@ def distance(a: Behaviour, b: Behaviour) -> float:
     For 30 variants of the corral's teacher that were trained on readings spread over the ranges of the sensors, the
     rank correlation with disagreement is about .94. It falls to about .4 on the readings of its runs, many of which
     resemble each other: training gives the pairs near a threshold most of the weight. Programs of `OneShot`, which
-    weights all pairs alike, keep .83 there (`experiments.composition.algebra.distance`).
+    weights all pairs alike, keep .83 there (`torchvsa algebra`).
 
     Raises `ValueError` for behaviours over different spaces, whose programs are unrelated.
     """

@@ -1,262 +1,234 @@
-"""How many behaviours fit into one vector, and what their contradictions cost.
+"""How many behaviours fit into one vector, and what do their contradictions cost?
 
-Plain functions that return numbers. A behaviour has 20 random conditions of 3 sensors of 16 values each, lookup codes
-joined by a product, and random results out of 9 independent ones. All behaviours of a bank are in one vector: their
-plain sum (bundled), or each bound to a context (gated).
+Banks of 1 to 256 random behaviours of 20 pairs each are put into one vector: as their plain sum, or each bound to a
+context. Every pair is asked again, and recall is compared with what theory predicts from the number of pairs.
 
-There are 16³ = 4,096 conditions, so that only banks of up to 128 behaviours (2,560 pairs) can be free of
-contradictions. They are drawn so: no condition is in two behaviours of the first 128, nor in two of the last 128. In a
-bank of 256 behaviours, conditions are shared by both halves, most of them with different results.
+    torchvsa scale
+    torchvsa scale dims=[2000] sizes=[1,8,64] contradicting=[]
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-import numpy as np
+import pandas as pd
 import torch
-from jaxtyping import Float, Float64, Int64, Shaped
-from torch import Tensor
 
-from behaviours import Actuator, Schema, Sensor, Space
-from experiments.kit import Column, Table
-from torchvsa import architecture, recall_probability
-from torchvsa.encoders import Lookup, Product
+from experiments.composition import scale_figures
+from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, aggregated, grid, setting
+from experiments.tasks import random_behaviours as task
+from torchvsa import recall_probability
 
-VALUES, SENSORS, RESULTS, PAIRS = 16, 3, 9, 20
-DIMS = (1000, 4000, 16_000, 64_000)
-SIZES = (1, 2, 4, 8, 16, 32, 64, 128, 256)
-"""Numbers of behaviours; they divide the last one."""
-DISTINCT = 128
-"""Behaviours among which no condition is shared."""
-CODEBOOKS = range(5)
-"""5 x 256 x 20 = 25,600 queries per point."""
-MARGIN = 5.0
-"""In units of a stored pair, as in `ErrorDriven`."""
-POOL = 60
-"""Conditions from which all behaviours of a contradicting bank draw theirs."""
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+RULES = ("one_shot", "trained")
+VECTORS = ("bundled", "gated")
+RECALLS = [f"{rule}_{how}" for rule in RULES for how in (*VECTORS, "predicted")]
+"""The columns of recall."""
+MOST_CODEBOOKS = 1000
 
 
-@dataclass(frozen=True)
-class Shown:
-    """The pairs of several behaviours, encoded.
+@dataclass
+class Scale(Settings):
+    """The settings of this study."""
 
-    Attributes:
-        cells: `[b, k, 3]`, the values of the sensors.
-        results: `[b, k]`.
-        conditions: `[k, b, d]`, int8.
-        items: `[9, d]`, float32.
-    """
-
-    cells: Int64[Tensor, "b k n"]
-    results: Int64[Tensor, "b k"]
-    conditions: Shaped[Tensor, "k b d"]
-    items: Float[Tensor, "r d"]
-
-    @classmethod
-    def of(cls, dim: int, codebook: int, cells: Int64[Tensor, "b k n"], results: Int64[Tensor, "b k"]) -> Shown:
-        """Encode pairs with the codebooks of a seed."""
-        made = space(dim, codebook)
-        conditions = torch.stack([made.encode(column) for column in cells.unbind(1)])
-        return cls(cells, results, conditions, made.items(torch.arange(RESULTS)[:, None]).to(torch.float32))
-
-
-def space(dim: int, codebook: int) -> Space:
-    """Lookup codes of integers, joined by a product, and 9 independent results."""
-    vsa = architecture("MAP-I", dim, "int8")
-    schema = Schema(
-        [Sensor(name, 0, VALUES) for name in ("left", "right", "front")],
-        [Actuator("result", 0, RESULTS - 1, levels=RESULTS)],
+    dims: list[int] = setting([1000, 4000, 16_000, 64_000], "elements of a hypervector", low=1, distinct=True)
+    sizes: list[int] = setting(
+        [1, 2, 4, 8, 16, 32, 64, 128, 256], "behaviours in one vector; they divide the largest number", low=1,
+        high=2 * task.DISTINCT, distinct=True,
+    )  # fmt: skip
+    codebooks: int = setting(5, "draws of codebooks and behaviours", low=1, high=MOST_CODEBOOKS)
+    contradicting: list[int] = setting(
+        [2, 3, 8], "behaviours in one vector that contradict each other", low=1, distinct=True, empty=True
     )
-    codes = Lookup(vsa, RESULTS)
-    return Space(schema, Product(Lookup(vsa, VALUES), SENSORS), seed=codebook, command_codes=codes)
+    contradicting_dim: int = setting(4000, "elements of the hypervector of those", low=1)
+    contradicting_codebooks: int = setting(20, "draws of codebooks for those", low=1, high=MOST_CODEBOOKS)
+    contradicting_queries: int = setting(20_000, "pairs asked of those for each number, at least", low=1)
 
 
-def behaviours(count: int, seed: int) -> tuple[Int64[Tensor, "b k n"], Int64[Tensor, "b k"]]:
-    """Cells and results of behaviours; no condition is in two of the same `DISTINCT` ones."""
-    rng = np.random.default_rng([seed, 0])
-    halves = [rng.permutation(VALUES**SENSORS)[: DISTINCT * PAIRS] for _ in range(-(-count // DISTINCT))]
-    chosen = np.concatenate(halves).reshape(-1, PAIRS)[:count]
-    return _cells(chosen), torch.from_numpy(rng.integers(0, RESULTS, chosen.shape))
+def check(settings: Scale) -> None:
+    """Raise for sizes that do not divide the largest one: a bank of that many is split into smaller ones."""
+    for size in settings.sizes:
+        if max(settings.sizes) % size:
+            raise ValueError(f"sizes={size} does not divide the largest size, {max(settings.sizes)}")
 
 
-def contradicting(count: int, seed: int) -> tuple[Int64[Tensor, "b k n"], Int64[Tensor, "b k"]]:
-    """Cells and results of behaviours that all draw their conditions from the same `POOL`."""
-    rng = np.random.default_rng([seed, 1])
-    pool = rng.permutation(VALUES**SENSORS)[:POOL]
-    chosen = np.stack([rng.permutation(pool)[:PAIRS] for _ in range(count)])
-    return _cells(chosen), torch.from_numpy(rng.integers(0, RESULTS, chosen.shape))
+def cells(settings: Scale) -> list[Cell]:
+    """A cell for each dimension and codebook, the largest dimension first; then those with contradictions."""
+    dims = sorted(settings.dims, reverse=True)
+    found = grid(kind=["distinct"], dim=dims, codebook=range(settings.codebooks))
+    if settings.contradicting:
+        dims, codebooks = [settings.contradicting_dim], range(settings.contradicting_codebooks)
+        found += grid(kind=["contradicting"], dim=dims, codebook=codebooks)
+    return found
 
 
-def _cells(numbers: np.ndarray[tuple[int, ...], np.dtype[np.int64]]) -> Int64[Tensor, "b k n"]:
-    return torch.from_numpy(np.stack(np.unravel_index(numbers, (VALUES,) * SENSORS), -1))
+def measure(settings: Scale, cell: Cell) -> list[Row]:
+    """A row of recall and predictions for each number of behaviours in one vector."""
+    seed = MOST_CODEBOOKS * settings.seed + cell["codebook"]
+    if cell["kind"] == "distinct":
+        return distinct(cell["dim"], seed, settings.sizes)
+    # As many banks from each codebook as it takes.
+    codebooks = settings.contradicting_codebooks
+    found = []
+    for size in settings.contradicting:
+        banks = -(-settings.contradicting_queries // (codebooks * size * task.PAIRS))
+        found.append(contradicting(cell["dim"], seed, size, banks))
+    return found
 
 
-def one_shot(shown: Shown) -> Float[Tensor, "b d"]:
-    """The programs of `OneShot`: the sum of all pairs. Whole numbers in float32, exact up to 2^24."""
-    programs = torch.zeros(shown.conditions.shape[1:])
-    for number, conditions in enumerate(shown.conditions):
-        programs += conditions * shown.items[shown.results[:, number]]
-    return programs
+def distinct(dim: int, seed: int, sizes: Sequence[int]) -> list[Row]:
+    """Recall of banks of up to 128 behaviours that share no condition, and of larger ones, beside its prediction.
 
-
-def trained(shown: Shown, margin: float = MARGIN, epochs: int = 200) -> Float[Tensor, "b d"]:
-    """The programs of `ErrorDriven(margin)`, all behaviours trained at once."""
-    dim = shown.items.shape[1]
-    programs = torch.zeros(shown.conditions.shape[1:])
-    rows = torch.arange(len(programs))
-    # A program knows only the results that it was shown.
-    unknown = torch.ones(len(programs), RESULTS, dtype=torch.bool).scatter(1, shown.results, False)
-    for _ in range(epochs):
-        corrected = 0
-        for number, conditions in enumerate(shown.conditions):
-            target = shown.results[:, number]
-            scores = ((programs * conditions) @ shown.items.T).masked_fill(unknown, -torch.inf)
-            others = scores.clone()
-            others[rows, target] = -torch.inf
-            rival_score, rival = others.max(1)
-            lead = scores[rows, target] - rival_score.clamp(min=0)
-            short = ((lead < margin * dim) | (lead <= 0)).nonzero()[:, 0]
-            change = shown.items[target[short]]
-            change = change - shown.items[rival[short]] * (rival_score[short] > 0)[:, None]
-            programs[short] += conditions[short] * change
-            corrected += len(short)
-        if not corrected:
-            break
-    return programs
-
-
-def scores(shown: Shown, asked: Float[Tensor, "b d"]) -> Float[Tensor, "b k r"]:
-    """The scores of all results for each behaviour's conditions, asked of one vector per behaviour."""
-    return torch.stack([(asked * conditions) @ shown.items.T for conditions in shown.conditions], 1)
-
-
-def together(
-    programs: Float[Tensor, "b d"], size: int, contexts: Shaped[Tensor, "b d"] | None = None
-) -> Float[Tensor, "b d"]:
-    """What is asked for each behaviour if each `size` of them are in one vector: bundled, or gated by `contexts`."""
-    bound = programs if contexts is None else programs * contexts
-    vectors = bound.view(-1, size, bound.shape[1]).sum(1).repeat_interleave(size, 0)
-    return vectors if contexts is None else vectors * contexts
-
-
-def recall(found: Float[Tensor, "b k r"], results: Int64[Tensor, "b k"]) -> float:
-    """The share of queries whose result scores highest."""
-    return float((found.argmax(-1) == results).double().mean())
-
-
-def contexts_for(count: int, dim: int, codebook: int) -> Shaped[Tensor, "b d"]:
-    """Random contexts, unrelated to the codebooks of the same number."""
-    generator = torch.Generator().manual_seed(1_000_000 + codebook)
-    return architecture("MAP-I", dim, "int8").random(count, generator=generator)
-
-
-def predicted(
-    own: Float[Tensor, "b k r"], results: Int64[Tensor, "b k"], squares: Float64[Tensor, "b"], size: int
-) -> float:
-    """The expected recall in banks of `size`, from what is known of each program alone.
-
-    To the scores of a program the other ones add normal noise, for each result of variance Σ|pⱼ|² over the others. The
-    right result then wins with ∫ φ(x) · Π Φ(x + (s_right - s_other) / σ) dx, by Gauss-Hermite quadrature.
-
-    Args:
-        own: The scores that each program gives alone.
-        results: The right results.
-        squares: |pⱼ|².
-        size: The number of behaviours in a vector.
+    One-shot recall is predicted by `recall_probability("MAP-I", d, 20 b, 9)`, that of trained programs by `predicted`.
     """
-    if size == 1:
-        return recall(own, results)
-    groups = squares.view(-1, size)
-    deviation = (groups.sum(1, keepdim=True) - groups).flatten().sqrt()
-    right = own.gather(-1, results[..., None])
-    leads = ((right - own).double() / deviation[:, None, None]).scatter(-1, results[..., None], torch.inf)
-    points, weights = np.polynomial.hermite_e.hermegauss(40)
-    chance = torch.zeros(results.shape, dtype=torch.float64)
-    for point, weight in zip(points, weights, strict=True):
-        chance += weight * torch.special.ndtr(leads + point).prod(-1)
-    return float(chance.mean()) / float(weights.sum())
-
-
-def capacity(dim: int, codebooks: Iterable[int] = CODEBOOKS, sizes: Sequence[int] = SIZES) -> list[dict[str, float]]:
-    """Recall and its prediction for banks of several sizes: one row per size.
-
-    Columns: `one_shot` and `trained`, each `.bundled`, `.gated` and `.predicted`. One-shot recall is predicted by
-    `recall_probability("MAP-I", d, 20 b, 9)`, trained by `predicted`.
-    """
-    count, found = max(sizes), []
-    for codebook in codebooks:
-        shown = Shown.of(dim, codebook, *behaviours(count, codebook))
-        contexts = contexts_for(count, dim, codebook)
-        made = {"one_shot": one_shot(shown), "trained": trained(shown)}
-        own, squares = scores(shown, made["trained"]), made["trained"].double().square().sum(1)
-        for size in sizes:
-            row: dict[str, float] = {"dim": dim, "behaviours": size, "queries": count * PAIRS}
-            for name, programs in made.items():
-                row[f"{name}.bundled"] = recall(scores(shown, together(programs, size)), shown.results)
-                row[f"{name}.gated"] = recall(scores(shown, together(programs, size, contexts)), shown.results)
-            row["one_shot.predicted"] = recall_probability("MAP-I", dim, PAIRS * size, RESULTS)
-            row["trained.predicted"] = predicted(own, shown.results, squares, size)
-            found.append(row)
-    return [_mean([row for row in found if row["behaviours"] == size]) for size in sizes]
-
-
-def contradictions(
-    dim: int = 4000, codebooks: Iterable[int] = range(20), sizes: Sequence[int] = (2, 3, 8), queries: int = 20_000
-) -> list[dict[str, float]]:
-    """Recall of behaviours that contradict each other over 60 shared conditions, beside a count of votes.
-
-    Asked is each behaviour's own result. Counting votes predicts that the result of most behaviours wins, ties at
-    random.
-    """
-    codebooks, rows = list(codebooks), []
+    count = max(sizes)
+    shown = task.EncodedPairs.of(dim, seed, *task.behaviours(count, seed))
+    contexts = task.contexts_for(count, dim, seed)
+    programs = {"one_shot": task.one_shot(shown), "trained": task.trained(shown)}
+    own, squares = task.scores(shown, programs["trained"]), programs["trained"].double().square().sum(1)
+    found = []
     for size in sizes:
-        banks = -(-queries // (len(codebooks) * size * PAIRS))
-        found = []
-        for codebook in codebooks:
-            drawn = [contradicting(size, codebook * banks + bank) for bank in range(banks)]
-            cells, results = (torch.cat(part) for part in zip(*drawn, strict=True))
-            shown = Shown.of(dim, codebook, cells, results)
-            contexts = contexts_for(len(cells), dim, codebook)
-            row: dict[str, float] = {"dim": dim, "behaviours": size, "queries": len(cells) * PAIRS}
-            row["votes"] = sum(votes(*bank) for bank in drawn) / banks
-            for name, programs in (("one_shot", one_shot(shown)), ("trained", trained(shown))):
-                row[f"{name}.bundled"] = recall(scores(shown, together(programs, size)), results)
-                row[f"{name}.gated"] = recall(scores(shown, together(programs, size, contexts)), results)
-            found.append(row)
-        rows.append(_mean(found))
-    return rows
+        row: Row = {"behaviours": size, "queries": count * task.PAIRS}
+        for rule, made in programs.items():
+            row[f"{rule}_bundled"] = task.recall(task.scores(shown, task.together(made, size)), shown.results)
+            gated = task.scores(shown, task.together(made, size, contexts))
+            row[f"{rule}_gated"] = task.recall(gated, shown.results)
+        row["one_shot_predicted"] = recall_probability("MAP-I", dim, task.PAIRS * size, task.RESULTS)
+        row["trained_predicted"] = task.predicted(own, shown.results, squares, size)
+        found.append(row)
+    return found
 
 
-def votes(cells: Int64[Tensor, "b k n"], results: Int64[Tensor, "b k"]) -> float:
-    """The expected share of pairs whose result wins a count of votes, ties at random."""
-    condition = cells.flatten(0, 1).unique(dim=0, return_inverse=True)[1]
-    result = results.flatten()
-    counts = torch.zeros(int(condition.max()) + 1, RESULTS, dtype=torch.int64)
-    counts.index_put_((condition, result), torch.ones_like(result), accumulate=True)
-    wins = counts == counts.amax(1, keepdim=True)
-    return float((wins.double() / wins.sum(1, keepdim=True))[condition, result].mean())
+def contradicting(dim: int, seed: int, size: int, banks: int) -> Row:
+    """Recall of `banks` times `size` behaviours that contradict each other, each asked for its own results.
+
+    A count of votes predicts that the result of most behaviours wins, ties at random.
+    """
+    drawn = [task.contradicting(size, seed * banks + bank) for bank in range(banks)]
+    asked, results = (torch.cat(part) for part in zip(*drawn, strict=True))
+    shown = task.EncodedPairs.of(dim, seed, asked, results)
+    contexts = task.contexts_for(len(asked), dim, seed)
+    row: Row = {"behaviours": size, "queries": len(asked) * task.PAIRS}
+    row["votes"] = sum(task.votes(*bank) for bank in drawn) / banks
+    for rule, made in (("one_shot", task.one_shot(shown)), ("trained", task.trained(shown))):
+        row[f"{rule}_bundled"] = task.recall(task.scores(shown, task.together(made, size)), results)
+        row[f"{rule}_gated"] = task.recall(task.scores(shown, task.together(made, size, contexts)), results)
+    return row
 
 
-def misses(rows: Sequence[dict[str, float]], most: int = DISTINCT) -> dict[str, float]:
-    """The largest difference between recall and its prediction, for banks of up to `most` behaviours."""
+def summarise(settings: Scale, records: pd.DataFrame) -> list[Row]:
+    """A row for each kind, dimension and number of behaviours: means over the codebooks, and all queries."""
+    names = [name for name in (*RECALLS, "votes") if name in records]
+    columns = {"queries": ("queries", "sum"), **{name: (name, "mean") for name in names}}
+    order = grid(kind=["distinct"], dim=settings.dims, behaviours=settings.sizes)
+    order += grid(kind=["contradicting"], dim=[settings.contradicting_dim], behaviours=settings.contradicting)
+    rows = aggregated(records, ["kind", "dim", "behaviours"], columns, order)
+    return [{key: value for key, value in row.items() if value == value} for row in rows]  # what a kind has
+
+
+def metrics(settings: Scale, records: pd.DataFrame, table: list[Row]) -> dict[str, float]:
+    """The largest difference between recall and its prediction, for banks without contradictions."""
+    rows = [row for row in table if row["kind"] == "distinct" and row["behaviours"] <= task.DISTINCT]
     return {
-        f"{rule}.{how}": max(
-            abs(row[f"{rule}.{how}"] - row[f"{rule}.predicted"]) for row in rows if row["behaviours"] <= most
+        f"{rule}.largest_difference": max(
+            abs(row[f"{rule}_{how}"] - row[f"{rule}_predicted"]) for row in rows for how in VECTORS
         )
-        for rule in ("one_shot", "trained")
-        for how in ("bundled", "gated")
+        for rule in RULES
+        if rows
     }
 
 
-def table(rows: Sequence[dict[str, float]]) -> str:
-    """The rows of `capacity` or `contradictions` as a Markdown table."""
-    columns = [Column(name, name, ".3f" if "." in name or name == "votes" else ".0f") for name in rows[0]]
-    return Table("Recall", columns).show(rows).markdown()
+def headline(outcome: Outcome) -> str:
+    """How far recall is from its prediction."""
+    found = {rule: outcome.metrics.get(f"{rule}.largest_difference") for rule in RULES}
+    if None in found.values():
+        return ""
+    return (
+        f"b behaviours of {task.PAIRS} pairs in one vector are recalled like {task.PAIRS}·b pairs: up to b = "
+        f"{task.DISTINCT}, at every d, the largest difference from the prediction is {found['one_shot']:.3f} for "
+        f"programs superposed once and {found['trained']:.3f} for trained ones."
+    )
 
 
-def _mean(rows: Sequence[dict[str, float]]) -> dict[str, float]:
-    """The mean of each column over codebooks; queries are added."""
-    mean = {name: sum(row[name] for row in rows) / len(rows) for name in rows[0]}
-    return mean | {"queries": sum(row["queries"] for row in rows)}
+def tables(outcome: Outcome) -> list[Table]:
+    """A table for each kind."""
+    return [
+        table.show(rows)
+        for kind, table in TABLES.items()
+        if (rows := [row for row in outcome.table if row["kind"] == kind])
+    ]
+
+
+KEYS = [Column("dim", "d"), Column("behaviours", "behaviours b"), Column("queries", about="pairs asked")]
+BUNDLED, GATED = "asked of the plain sum", "asked of the sum of programs that are each bound to a context"
+TABLES = {
+    "distinct": Table(
+        "Recall of all pairs, by the number of behaviours in one vector",
+        [
+            *KEYS,
+            Column("one_shot_bundled", "one-shot: bundled", ".3f", about=f"each pair superposed once; {BUNDLED}"),
+            Column("one_shot_gated", "gated", ".3f", about=GATED),
+            Column("one_shot_predicted", "predicted", ".3f", about="by the closed form for 20 b random pairs"),
+            Column("trained_bundled", "trained: bundled", ".3f", about="error-driven with a margin of 5 pairs"),
+            Column("trained_gated", "gated", ".3f"),
+            Column("trained_predicted", "predicted", ".3f", about="from each program's own scores and all lengths"),
+        ],
+    ),
+    "contradicting": Table(
+        "Recall of behaviours that contradict each other",
+        [
+            *KEYS,
+            Column("votes", "count of votes", ".3f", about="expected if the result of most behaviours wins"),
+            Column("one_shot_bundled", "one-shot: bundled", ".3f"),
+            Column("one_shot_gated", "gated", ".3f"),
+            Column("trained_bundled", "trained: bundled", ".3f"),
+            Column("trained_gated", "gated", ".3f"),
+        ],
+    ),
+}
+METHOD = f"""
+A behaviour has {task.PAIRS} random conditions of 3 sensors of {task.VALUES} values each (lookup codes joined by a
+product) with random results out of {task.RESULTS} independent ones. There are 4,096 conditions: up to
+{task.DISTINCT} behaviours share none, while in banks of 256 most conditions are shared, with different results.
+
+The largest bank is drawn once from each codebook, and split into banks of each size; all its pairs are asked at every
+size. Programs superposed once are predicted by the closed form for a sum of 20 b random pairs (MAP-I; Frady, Kleyko and
+Sommer 2018). Trained ones are predicted from the scores that each program gives to its own pairs: the others add
+normal noise, whose variance is the sum of their squared lengths.
+
+Behaviours that contradict each other all draw their conditions from the same {task.POOL}. Each is asked for its own
+result.
+"""
+QUICK = {"dims": [500, 2000], "sizes": [1, 4, 16, 64], "codebooks": 2, "contradicting_codebooks": 2,
+         "contradicting_queries": 2000}  # fmt: skip
+
+study = Study(
+    name="scale",
+    about="How many behaviours fit into one vector, and what do their contradictions cost?",
+    settings=Scale,
+    check=check,
+    cells=cells,
+    measure=measure,
+    summarise=summarise,
+    keys=("kind", "dim", "behaviours"),
+    metrics=metrics,
+    tables=tables,
+    figures=[
+        Drawing(
+            "scale", scale_figures.recall, "recall against the number of behaviours, a colour for each dimension",
+            "Points are measured, lines predicted (solid: superposed once; dotted: trained). Beyond the vertical line "
+            "there are more pairs than conditions, so that bundled behaviours contradict each other.",
+        ),
+        Drawing(
+            "contradictions", scale_figures.contradictions,
+            "recall of contradicting behaviours, and a count of votes",
+            "In a sum the result of most behaviours wins; contexts keep them apart.",
+        ),
+    ],
+    headline=headline,
+    method=METHOD,
+    presets={"quick": QUICK},
+)  # fmt: skip

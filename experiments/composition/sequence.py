@@ -1,143 +1,217 @@
-"""First to one lamp, then to the other: one vector of contexts and transitions, and the second goal never demonstrated.
+"""Can one vector do one thing after the other, the second of which was never demonstrated?
 
-Plain functions that return numbers. 'To blue' is learned from runs of the teacher towards the blue lamp, with a pair of
-light sensors per colour. In the codes one involution swaps the colours, so that `behaviour.mirror()` is 'to yellow'.
-The transition is learned from the readings of the same runs, at the blue lamp and before it. See
-`behaviours.Sequencing`.
+A robot in an arena with two lamps has to touch the blue one, then stay at the yellow one. It was shown only how to go
+to the blue lamp: the way to the yellow one is the mirror image of that program. Both programs, a context for each and
+the transition between them are one hypervector.
+
+    torchvsa sequence
+    torchvsa sequence arenas=[lamp_room] starts=100 bullet_starts=0
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import torch
-from jaxtyping import Bool
-from numpy.typing import NDArray
-from torch import Tensor
+import pandas as pd
 
 import sim
-from behaviours import BehaviourBank, Demonstrations, ErrorDriven, Rule, Sequencing, Space
-from experiments.kit import Column, Table
+from behaviours import Demonstrations, ErrorDriven
+from behaviours.learning import no_convergence_warnings
+from experiments.composition import sequence_paths
+from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, grid, setting
+from experiments.kit.intervals import bootstrap
 from experiments.tasks import corral
+from experiments.tasks import two_lamps as task
 from experiments.tasks.agreement import share_right
-from torchvsa import MAP
-from torchvsa.encoders import Level, Mirrored
 
-DIM, BINS = 4000, 32
-MIRROR = {"blue_left": "yellow_left", "blue_right": "yellow_right"}
-SENSORS = ("blue_left", "blue_right", "distance")
-"""The sensors that 'to blue' uses; its mirror image uses the yellow ones."""
-RULE = ErrorDriven()
-SWITCHING = ErrorDriven(margin=5)
-TASK = sim.Task(lights=("blue", "yellow"), goals=("blue", "yellow"))
-SECONDS = 120.0
-"""Longest duration of an episode. The teacher that succeeds takes half a minute; in 240 s it succeeds no more often."""
+TEACHER, VECTOR, COMMON = "teacher", "one_vector", "one_vector_common"
+"""The rows of the table: five rules for each lamp in turn; one hypervector; the same from starts the teacher solves."""
+MOST_CODEBOOKS = 1000
 
 
-def room(side: float = 4.0, apart: float = 2.0) -> sim.Arena:
-    """A closed room with a blue lamp and a yellow one, `apart` in x and in y.
+@dataclass
+class Sequence(Settings):
+    """The settings of this study."""
 
-    In the arena `two_lamps` the teacher fails where it leaves the corral before it has found the blue lamp inside, and
-    then never comes back; here it cannot leave.
-    """
-    half, lamp = side / 2, apart / 2
-    floor, outline = (sim.Box(0.0, 0.0, reach, reach) for reach in (half, half + 0.06))
-    lamps = sim.Lamp(-lamp, lamp, colour="blue"), sim.Lamp(lamp, -lamp, colour="yellow")
-    return sim.Arena(tuple(sim.walls(floor)), lamps, floor, outline)
+    arenas: list[str] = setting(
+        ["lamp_room", "two_lamps"], "where they learn and drive", choices=sim.ARENAS, distinct=True
+    )
+    starts: int = setting(500, "held-out starts, divided among the codebooks", low=1)
+    bullet_starts: int = setting(200, "the first of them that are driven in the physics engine, too", low=0)
+    codebooks: int = setting(10, "draws of codebooks and contexts", low=1, high=MOST_CODEBOOKS)
+    demonstrations: int = setting(20, "runs of the teacher to the blue lamp to learn from", low=1)
+    heldout: int = setting(200, "runs of the teacher to the yellow lamp about which 'to yellow' is asked", low=1)
+    seconds: float = setting(120.0, "longest duration of an episode, s; of a run to one lamp, half of it", above=0)
+    dim: int = setting(4000, "elements of the hypervector; even, since a mirror image is a rotation by half", low=2)
+    bins: int = setting(32, "bins per sensor", low=2)
+    margin: float = setting(0.5, "lead that counts as correct when 'to blue' is learned, in stored pairs", low=0)
+    switching_margin: float = setting(5.0, "the same for the transition", low=0)
 
 
-def space(codebook: int) -> Space:
-    """Level codes, in which one involution swaps the colours and leaves distance and wheels as they are."""
-    columns = [channel.name for channel in TASK.sensors]
-    pairs = [(columns.index(first), columns.index(second)) for first, second in MIRROR.items()]
-    encoder = Mirrored(Level(MAP(DIM, dtype=torch.int8), BINS), pairs, len(columns))
-    return Space(corral.schema(sensors=TASK.sensors), encoder, seed=codebook, mirror=MIRROR)
+def check(settings: Sequence) -> None:
+    """Raise for arenas without the two lamps, and for fewer starts than codebooks."""
+    fit = [name for name in sim.ARENAS if sim.Task.of(sim.find_arena(name)) == task.TASK]
+    for name in settings.arenas:
+        if name not in fit:
+            raise ValueError(f"arenas: {name} has no blue lamp and then a yellow one; choose from {', '.join(fit)}")
+    for name in ("starts", "bullet_starts"):
+        if 0 < (given := getattr(settings, name)) < settings.codebooks or (name == "starts" and not given):
+            raise ValueError(f"{name}={given}: expected at least one for each of codebooks={settings.codebooks}")
+    if settings.dim % 2:
+        raise ValueError(f"dim={settings.dim}: expected an even number")
+
+
+def cells(settings: Sequence) -> list[Cell]:
+    """A cell for each arena and codebook, and one for the teacher (codebook null)."""
+    return grid(arena=settings.arenas, codebook=[None, *range(settings.codebooks)])
 
 
 @dataclass(frozen=True)
-class Runs:
-    """Runs of the teacher to one lamp.
+class Material:
+    """What all cells share.
 
     Attributes:
-        shown: All control steps, until the robot has stayed at the lamp for the dwell time.
-        arrived: `[N]`, whether the robot touches the lamp.
+        settings: of the run.
+        folder: where paths are kept.
+        taught: runs to the blue lamp, by arena.
+        asked: moments of held-out runs on their way to the yellow lamp, by arena.
     """
 
-    shown: Demonstrations
-    arrived: Bool[Tensor, "N"]
+    settings: Sequence
+    folder: Path
+    taught: dict[str, task.Runs]
+    asked: dict[str, Demonstrations]
 
 
-def runs(arena: sim.Arena, episodes: int = 20, goal: str = "blue", first: int = corral.FIRST_DEMONSTRATION) -> Runs:
-    """Runs of `sim.InOrder` to one lamp only, by default from starts that are not tested."""
-    task = sim.Task(TASK.lights, (goal,))
-    driven = sim.rollout(
-        sim.InOrder(task), arena, task=task, episodes=range(first, first + episodes), seconds=SECONDS / 2
-    )
-    shown, _ = corral.shown_in(driven)
-    return Runs(shown, torch.from_numpy(driven.trajectory.at_lamp))
+def prepare(settings: Sequence, folder: Path, progress: Any) -> Material:
+    """Let the teacher drive to the blue lamp, from starts that are not tested, and to the yellow one from those."""
+    first, seconds = corral.FIRST_DEMONSTRATION, settings.seconds / 2
+    taught, asked = {}, {}
+    for arena in settings.arenas:
+        episodes = range(first, first + settings.demonstrations)
+        taught[arena] = task.runs(arena, "blue", episodes, settings.seed, seconds)
+        held = task.runs(arena, "yellow", range(settings.heldout), settings.seed, seconds)
+        asked[arena] = held.shown.where(~held.arrived)
+    return Material(settings, folder, taught, asked)
 
 
-def bank(codebook: int, taught: Runs, rule: Rule = RULE) -> BehaviourBank:
-    """'To blue', learned, and 'to yellow', its mirror image."""
-    made = BehaviourBank(space(codebook))
-    made.learn("to blue", taught.shown, rule, sensors=SENSORS)
-    made.add("to yellow", made["to blue"].mirror())
-    return made
+def measure(material: Material, cell: Cell) -> list[Row]:
+    """For each engine and start, whether the robot touches the blue lamp and then stays at the yellow one.
 
-
-def policy(codebook: int, taught: Runs, switching: Rule = SWITCHING) -> Sequencing:
-    """Both behaviours and the transition between them in one vector; contexts and tag are drawn from the codebook."""
-    transitions = {
-        ("to blue", "to blue"): taught.shown.where(~taught.arrived),
-        ("to blue", "to yellow"): taught.shown.where(taught.arrived),
-    }
-    return Sequencing(bank(codebook, taught), transitions, switching, seed=codebook)
-
-
-def agreement(arena: sim.Arena, codebook: int, taught: Runs, tested: int = 200) -> float:
-    """The share of steps, of teachers on their way to yellow, at which 'to yellow' commands what they do."""
-    asked = runs(arena, tested, "yellow", first=0)
-    moving = asked.shown.where(~asked.arrived)
-    return share_right(bank(codebook, taught)["to yellow"], moving)
-
-
-def succeeds(controller: sim.ControllerLike, arena: sim.Arena, starts: Sequence[int], engine: str) -> NDArray[np.bool_]:
-    """For each start, whether the robot touches the blue lamp and then stays at the yellow one."""
-    return sim.rollout(
-        controller, arena, task=TASK, episodes=starts, seconds=SECONDS, engine=engine, record=False
-    ).success
-
-
-def compare(
-    arena: sim.Arena, codebooks: Sequence[int] = range(10), starts: int = 500, engine: str = "vector"
-) -> dict[str, dict[str, Any]]:
-    """Success of the teacher and of the vector from the same starts, split over codebooks, with Wilson's intervals.
-
-    Returns:
-        The rows `teacher`, `one vector`, and `one vector, where the teacher succeeds`, each with `episodes`,
-        `success_rate`, `success_low` and `success_high`.
+    `agreement`, the same in all rows of a codebook, is the share of held-out moments in which 'to yellow' commands what
+    the teacher does.
     """
-    taught = runs(arena)
-    teacher = succeeds(sim.InOrder(TASK), arena, range(starts), engine)
-    parts = np.array_split(np.arange(starts), len(codebooks))
-    learned = np.concatenate(
-        [
-            succeeds(policy(codebook, taught), arena, part.tolist(), engine)
-            for codebook, part in zip(codebooks, parts, strict=True)
-        ]
-    )
-    rows = {"teacher": teacher, "one vector": learned, "one vector, where the teacher succeeds": learned[teacher]}
-    return {name: corral.success(len(found), int(found.sum())) for name, found in rows.items()}
+    settings, arena, codebook = material.settings, cell["arena"], cell["codebook"]
+    if codebook is None:
+        return drive(settings, arena, sim.InOrder(task.TASK))
+    taught, seed = material.taught[arena], MOST_CODEBOOKS * settings.seed + codebook
+    with no_convergence_warnings():
+        both = task.bank(task.space(settings.dim, settings.bins, seed), taught, ErrorDriven(settings.margin))
+        policy = task.policy(both, taught, ErrorDriven(settings.switching_margin), seed)
+    if codebook == 0:
+        sequence_paths.write(material.folder, arena, policy, settings.seed, settings.seconds)
+    agreement = share_right(both["to yellow"], material.asked[arena])
+    rows = drive(settings, arena, task.AskedOnce(policy), codebook)
+    return [{**row, "agreement": agreement} for row in rows]
 
 
-def table(rows: dict[str, dict[str, Any]]) -> str:
-    """The rows of `compare` as a Markdown table."""
-    columns = [
-        Column("row"),
-        Column("success_rate", "success", ".3f", interval=("success_low", "success_high")),
-        Column("episodes", "starts", ".0f"),
+def drive(settings: Sequence, arena: str, controller: sim.ControllerLike, codebook: int | None = None) -> list[Row]:
+    """A row for each engine and start, of all or of those of one codebook."""
+    rows = []
+    for engine, count in (("vector", settings.starts), ("bullet", settings.bullet_starts)):
+        if count:
+            chosen = (
+                np.arange(count) if codebook is None else np.array_split(np.arange(count), settings.codebooks)[codebook]
+            )
+            driven = sim.rollout(
+                controller, arena, task=task.TASK, episodes=chosen.tolist(), seed=settings.seed,
+                seconds=settings.seconds, engine=engine, record=False,
+            )  # fmt: skip
+            for start, success in zip(driven.episode.tolist(), driven.success.tolist(), strict=True):
+                row = TEACHER if codebook is None else VECTOR
+                rows.append({"engine": engine, "row": row, "episode": start, "success": success})
+    return rows
+
+
+def summarise(settings: Sequence, records: pd.DataFrame) -> list[Row]:
+    """A row for each arena, engine and controller; the last one counts only starts where the teacher succeeds."""
+    table: list[Row] = []
+    for cell in grid(arena=settings.arenas, engine=records.engine.unique()):
+        here = records.loc[(records.arena == cell["arena"]) & (records.engine == cell["engine"])]
+        rows = {name: here.loc[here.row == name].set_index("episode") for name in (TEACHER, VECTOR)}
+        solved = rows[TEACHER].index[rows[TEACHER].success]
+        rows[COMMON] = rows[VECTOR].loc[solved]
+        for name, own in rows.items():
+            row = {**cell, "row": name, **corral.success(len(own), int(own.success.sum()))}
+            if name == VECTOR and cell["engine"] == "vector":
+                shares = own.groupby("codebook").agreement.first()
+                low, high = bootstrap(shares.to_numpy())
+                row |= {"agreement": shares.mean(), "agreement_low": low, "agreement_high": high}
+            table.append(row)
+    return table
+
+
+def headline(outcome: Outcome) -> str:
+    """From how many starts one vector and the teacher do both."""
+    found = {(row["arena"], row["row"]): row for row in outcome.table if row["engine"] == "vector"}
+    words = [
+        f"in {arena} from {found[arena, VECTOR]['success_rate']:.1%} of {found[arena, VECTOR]['episodes']:,} starts "
+        f"(its teacher from {found[arena, TEACHER]['success_rate']:.1%})"
+        for arena in outcome.settings.arenas
     ]
-    return Table("In sequence", columns).show([{"row": name, **row} for name, row in rows.items()]).markdown()
+    return f"One vector goes to the blue lamp and then to the yellow one, which was never shown: {'; '.join(words)}."
+
+
+TABLE = Table(
+    "First blue, then yellow",
+    [
+        Column("row", about="one_vector_common: one_vector from the starts where the teacher succeeds"),
+        Column("arena"),
+        Column("engine"),
+        Column("episodes", "starts", ",d"),
+        Column("success_rate", "success", ".3f", interval=("success_low", "success_high"), about=(
+            "robots that touch the blue lamp and then stay at the yellow one, with Wilson's 95 % interval"
+        )),
+        Column("agreement", format=".3f", interval=("agreement_low", "agreement_high"), about=(
+            "share of the teacher's moments on its way to the yellow lamp in which 'to yellow' commands the same, mean "
+            "over codebooks, with their bootstrap"
+        )),
+    ],
+)  # fmt: skip
+METHOD = """
+The teacher drives to the blue lamp only, in the same arena, from starts that are not tested. 'To blue' learns from
+these runs, with its own pair of light sensors and the distance. In the codes one involution swaps the colours: the
+mirror image of the program is 'to yellow', which nobody demonstrated. The transition is learned from the same readings:
+at the blue lamp, hand over; before it, go on.
+
+The starts are divided among the codebooks. All rows of an arena and an engine drive from the same starts, with the same
+wheel noise.
+"""
+QUICK = {"arenas": ["lamp_room"], "starts": 20, "bullet_starts": 0, "codebooks": 2, "heldout": 20}
+
+study = Study(
+    name="sequence",
+    about="Can one vector do one thing after the other, the second of which was never demonstrated?",
+    settings=Sequence,
+    check=check,
+    cells=cells,
+    prepare=prepare,
+    measure=measure,
+    summarise=summarise,
+    keys=("arena", "engine", "row"),
+    table=TABLE,
+    figures=[
+        Drawing(
+            "paths", sequence_paths.draw, "paths in each arena, coloured by the behaviour that speaks",
+            "Paths of one vector, coloured by the behaviour that speaks. A circle marks each start, a cross the end of "
+            "an episode without success.",
+        ),
+    ],
+    headline=headline,
+    method=METHOD,
+    presets={"quick": QUICK},
+    objective="lamp_room.vector.one_vector.success_rate",
+)  # fmt: skip

@@ -14,7 +14,10 @@ from experiments.kit.options import options
 from experiments.kit.run import check_all
 
 ROOT = Path(__file__).parents[2]
-NAMES = ("capacity", "corral", "generalisation", "observability", "robustness", "smooth", "wall_following")
+NAMES = (
+    "algebra", "capacity", "composition", "corral", "generalisation", "interference", "observability", "robustness",
+    "scale", "sequence", "smooth", "wall_following",
+)  # fmt: skip
 
 
 def test_the_studies_are_all_there() -> None:
