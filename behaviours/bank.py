@@ -245,7 +245,10 @@ class BehaviourBank(nn.Module):
                 entries = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
                 terms = [entry.get("terms") for entry in about["behaviours"]]
                 used = [entry.get("sensors") for entry in about["behaviours"]]
-                least = [{name: _least(name, entry.get(name)) for name in _LEAST} for entry in about["behaviours"]]
+                least = [
+                    {name: as_float(name, entry[name], -1) for name in _LEAST if entry.get(name) is not None}
+                    for entry in about["behaviours"]
+                ]
                 for name, _ in entries:
                     check_name(name)
                 if len({name for name, _ in entries}) < len(entries):
@@ -270,8 +273,7 @@ class BehaviourBank(nn.Module):
                     check_levels(space.schema, results)
                     parsed = () if terms[number] is None else terms_from_dicts(terms[number], results)
                     behaviour = Behaviour(spaces[number], program, known, results, report, parsed)
-                    for least_name, value in least[number].items():
-                        setattr(behaviour, least_name, value)
+                    vars(behaviour).update(least[number])
                 bank.add(name, behaviour)
         return bank
 
@@ -291,10 +293,6 @@ def _entry(name: str, behaviour: Behaviour) -> dict[str, Any]:
         entry |= {"sensors": list(behaviour.space.sensors)}
     # A behaviour that is no sum has no terms to write.
     return entry | ({"terms": terms_to_dicts(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
-
-
-def _least(name: str, value: Any) -> float | None:
-    return None if value is None else as_float(name, value, -1)
 
 
 def check_name(name: object) -> None:
