@@ -278,8 +278,7 @@ class BehaviourBank(nn.Module):
         return bank
 
 
-_PARTS = ("program", "known", "results")
-_LEAST = ("threshold", "least_similarity")
+_PARTS, _LEAST = ("program", "known", "results"), ("threshold", "least_similarity")
 
 
 def _codebooks(config: dict[str, Any]) -> Layout:
