@@ -70,7 +70,8 @@ class Material:
 
 def prepare(settings: Composition, folder: Path, progress: Progress) -> Material:
     """Let the teacher demonstrate in `default`, and drive held-out starts in every arena."""
-    shown = demonstrated(settings, progress)
+    kinds = dict.fromkeys(line_of(name).bank for name in [*settings.rows, *settings.bullet_rows])
+    shown = demonstrated(settings, progress).with_banks([kind for kind in kinds if kind], progress)
     moments = {}
     for name in settings.arenas:
         what, asked = f"held out in {name}", range(settings.heldout)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
-from dataclasses import dataclass
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from behaviours import (
     choosing,
 )
 from experiments.kit import parts
+from experiments.kit.pool import measured
 from experiments.models.baselines import CLASSIFIERS, Classified
 from experiments.models.behaviour_tree import BehaviourTree
 from experiments.tasks import corral
@@ -39,6 +41,8 @@ from experiments.tasks.behaviours import Precedence
 if TYPE_CHECKING:
     from experiments.composition.settings import Combining
 
+PLAIN, EVIDENT, MASKED = "plain", "evident", "masked"
+"""Kinds of banks, see `Shown.bank`."""
 MASKS = {"seek_light": ["light_left", "light_right"], "avoid": ["distance"]}
 """The sensors that each behaviour uses in the rows `masked_*`: prior knowledge. `cruise` uses all."""
 
@@ -50,10 +54,12 @@ class Shown:
     Attributes:
         settings: of the run.
         train: moments of the teacher's runs in the arena `default`.
+        banks: those that are learned already, by their kind and the draw of the codebooks (see `with_banks`).
     """
 
     settings: Combining
     train: Demonstrations
+    banks: Mapping[tuple[str, int], BehaviourBank] = field(default_factory=dict)
 
     @functools.cached_property
     def rules(self) -> Precedence:
@@ -73,18 +79,36 @@ class Shown:
             corral.schema(), settings.vsa, settings.encoder, chosen, settings.protection, settings.seed + codebook
         )
 
-    def bank(self, codebook: int, record: str | None = None) -> BehaviourBank:
-        """The three behaviours learned apart; none knows of the others."""
-        bank = BehaviourBank(self.space(codebook, record))
-        bank.learn_apart(self.apart, parts.rule(self.settings.rule), silence=False)
+    def bank(self, codebook: int, kind: str = PLAIN, record: str | None = None) -> BehaviourBank:
+        """The behaviours learned apart.
+
+        In a `PLAIN` bank none knows of the others. In an `EVIDENT` one each is silent where only others know, and
+        louder the more it has seen; in a `MASKED` one it also sees its own sensors only.
+        """
+        if record is None and (kind, codebook) in self.banks:
+            return self.banks[kind, codebook]
+        bank, settings = BehaviourBank(self.space(codebook, record)), self.settings
+        if kind == PLAIN:
+            bank.learn_apart(self.apart, parts.rule(settings.rule), silence=False)
+        else:
+            masks = {name: MASKS[name] for name in self.apart if name in MASKS} if kind == MASKED else None
+            bank.learn_apart(self.apart, parts.rule(settings.evident), sensors=masks)
         return bank
 
-    def evident_bank(self, codebook: int, masks: dict[str, list[str]] | None = None) -> BehaviourBank:
-        """The same, each silent where only others know, and louder the more it has seen."""
-        bank = BehaviourBank(self.space(codebook))
-        own = {name: sensors for name, sensors in (masks or {}).items() if name in self.apart}
-        bank.learn_apart(self.apart, parts.rule(self.settings.evident), sensors=own)
-        return bank
+    def with_banks(self, kinds: Sequence[str], progress: Progress) -> Shown:
+        """The same, with the banks of these kinds learned for each draw of the codebooks, on all workers."""
+        wanted = list(itertools.product(kinds, range(self.settings.codebooks)))
+        task = progress.add_task("learn apart", total=len(wanted))
+        banks = {}
+        for place, bank in measured(_learned, self, wanted, self.settings.workers):
+            banks[wanted[place]] = bank
+            progress.advance(task)
+        return replace(self, banks=banks)
+
+
+def _learned(shown: Shown, which: tuple[str, int]) -> BehaviourBank:
+    kind, codebook = which
+    return shown.bank(codebook, kind)
 
 
 def demonstrated(settings: Combining, progress: Progress) -> Shown:
@@ -104,12 +128,14 @@ class Line:
         about: what it is, in a few words.
         codebooks: whether it is made anew for each draw of the codebooks.
         memory: whether it has a memory.
+        bank: the kind of bank that it is made of.
     """
 
     make: Callable[[Shown, int], Any]
     about: str
     codebooks: bool = True
     memory: bool = False
+    bank: str | None = None
 
 
 def together(shown: Shown, codebook: int, record: str | None = None) -> Behaviour:
@@ -119,18 +145,18 @@ def together(shown: Shown, codebook: int, record: str | None = None) -> Behaviou
 
 def plain_sum(shown: Shown, codebook: int, record: str | None = None) -> Bundle:
     """The sum of programs that know nothing of each other."""
-    return Bundle(shown.bank(codebook, record))
+    return Bundle(shown.bank(codebook, record=record))
 
 
 def evident_sum(shown: Shown, codebook: int) -> Bundle:
     """The sum of programs learned apart, each silent where only others know, and louder the more it has seen."""
-    return Bundle(shown.evident_bank(codebook))
+    return Bundle(shown.bank(codebook, EVIDENT))
 
 
 def masked_sum(shown: Shown, codebook: int) -> MotorSchema:
     """The scores of behaviours that see their own sensors only, with precedence for the light."""
     loud = {name: shown.settings.precedence for name in ("seek_light",) if name in shown.apart}
-    return MotorSchema(shown.evident_bank(codebook, MASKS), loud, familiarity=False)
+    return MotorSchema(shown.bank(codebook, MASKED), loud, familiarity=False)
 
 
 def hierarchy_trained(shown: Shown, codebook: int) -> Hierarchy:
@@ -175,14 +201,14 @@ class Oracle:
         return commands, which
 
 
-def plain(made: Callable[[BehaviourBank], Controller]) -> Callable[[Shown, int], Controller]:
+def plain(made: Callable[[BehaviourBank], Controller], about: str, memory: bool = False) -> Line:
     """A policy over behaviours that know nothing of each other."""
-    return lambda shown, codebook: made(shown.bank(codebook))
+    return Line(lambda shown, codebook: made(shown.bank(codebook)), about, memory=memory, bank=PLAIN)
 
 
-def masked(made: Callable[[BehaviourBank], Controller]) -> Callable[[Shown, int], Controller]:
+def masked(made: Callable[[BehaviourBank], Controller], about: str) -> Line:
     """A policy over behaviours that see their own sensors only, and are silent where only others know."""
-    return lambda shown, codebook: made(shown.evident_bank(codebook, MASKS))
+    return Line(lambda shown, codebook: made(shown.bank(codebook, MASKED)), about, bank=MASKED)
 
 
 ROWS: dict[str, Line] = {
@@ -196,30 +222,35 @@ ROWS: dict[str, Line] = {
         lambda shown, codebook: Oracle(shown.rules, [shown.bank(each) for each in range(shown.settings.codebooks)]),
         "separate programs; the teacher's rules say which one is asked",
         codebooks=False,
+        bank=PLAIN,
     ),
     "joint_program": Line(together, "one program learned from all demonstrations"),
-    "evident_sum": Line(evident_sum, "a plain sum of programs learned apart, silent where only others know"),
-    "masked_priority": Line(
-        masked(lambda bank: Priority(bank, by="similarity")),
+    "evident_sum": Line(
+        evident_sum, "a plain sum of programs learned apart, silent where only others know", bank=EVIDENT
+    ),
+    "masked_priority": masked(
+        lambda bank: Priority(bank, by="similarity"),
         "each behaviour sees its own sensors; the first whose answer is clear speaks",
     ),
-    "masked_winner": Line(
-        masked(WinnerTakesAll), "each behaviour sees its own sensors; the one that knows best speaks"
+    "masked_winner": masked(WinnerTakesAll, "each behaviour sees its own sensors; the one that knows best speaks"),
+    "masked_sum": Line(
+        masked_sum, "each behaviour sees its own sensors; scores are added, those of seek louder", bank=MASKED
     ),
-    "masked_sum": Line(masked_sum, "each behaviour sees its own sensors; scores are added, those of seek louder"),
-    "behaviour_tree": Line(
-        masked(lambda bank: BehaviourTree(bank, by="similarity")),
+    "behaviour_tree": masked(
+        lambda bank: BehaviourTree(bank, by="similarity"),
         "masked_priority as a selector of py_trees; the last one speaks where no answer is clear",
     ),
-    "plain_sum": Line(plain_sum, "the sum of programs that know nothing of each other"),
-    "priority": Line(plain(Priority), "the first that knows the condition speaks"),
-    "winner_takes_all": Line(plain(WinnerTakesAll), "the one that knows the condition best speaks"),
-    "gated": Line(plain(Gated), "one vector, asked with the context of the one that knows best"),
-    "hierarchy": Line(plain(Hierarchy), "one vector that also recalls whom to ask, from what each knows"),
-    "hierarchy_trained": Line(hierarchy_trained, "one vector that also recalls whom to ask, with a trained program"),
-    "motor_schema": Line(plain(MotorSchema), "scores weighted by familiarity"),
-    "blending": Line(plain(Blending), "commands weighted by familiarity"),
-    "vote": Line(plain(Vote), "the majority of commands"),
+    "plain_sum": Line(plain_sum, "the sum of programs that know nothing of each other", bank=PLAIN),
+    "priority": plain(Priority, "the first that knows the condition speaks"),
+    "winner_takes_all": plain(WinnerTakesAll, "the one that knows the condition best speaks"),
+    "gated": plain(Gated, "one vector, asked with the context of the one that knows best"),
+    "hierarchy": plain(Hierarchy, "one vector that also recalls whom to ask, from what each knows"),
+    "hierarchy_trained": Line(
+        hierarchy_trained, "one vector that also recalls whom to ask, with a trained program", bank=PLAIN
+    ),
+    "motor_schema": plain(MotorSchema, "scores weighted by familiarity"),
+    "blending": plain(Blending, "commands weighted by familiarity"),
+    "vote": plain(Vote, "the majority of commands"),
     "paper_sum": Line(paper_sum, "the printed algorithms: programs and sum clipped"),
     "joint_sum_record": Line(lambda *given: together(*given, record="sum"), "joint_program with sensors bundled"),
     "plain_sum_record": Line(lambda *given: plain_sum(*given, record="sum"), "plain_sum with sensors bundled"),
@@ -244,4 +275,4 @@ def line_of(name: str) -> Line:
         return ROWS[name]
     made = POLICIES.find(name)
     about = next(iter((made.__doc__ or name).splitlines()))
-    return Line(plain(made), about, memory=getattr(made, "start", None) is not Controller.start)
+    return plain(made, about, memory=getattr(made, "start", None) is not Controller.start)

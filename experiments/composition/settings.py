@@ -37,7 +37,7 @@ class Composition(Combining):
         list(ROWS), "the rows of the table, in this order; any policy is one, too", choices=rows_known, distinct=True
     )
     bullet_rows: list[str] = setting(
-        ["teacher", "joint_program", "evident_sum", "masked_priority", "masked_sum"],
+        ["teacher", "joint_program", "evident_sum", "masked_priority"],
         "rows that drive in the physics engine, too", choices=rows_known, distinct=True, empty=True,
     )  # fmt: skip
     arenas: list[str] = setting(ARENAS, "where they drive; all learn in `default`", choices=sim.ARENAS, distinct=True)

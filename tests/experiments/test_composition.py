@@ -13,7 +13,7 @@ import sim
 from behaviours import BehaviourBank, Demonstrations, OneShot, Priority
 from experiments.composition import damage, study
 from experiments.composition.measure import distinct
-from experiments.composition.rows import MASKS, ROWS, Shown, line_of
+from experiments.composition.rows import MASKED, ROWS, Shown, line_of
 from experiments.kit.run import check_all, run
 from experiments.models.behaviour_tree import BehaviourTree
 from experiments.tasks import corral
@@ -167,7 +167,7 @@ def test_damage_leaves_less(tmp_path: Path) -> None:
 
 def test_a_behaviour_tree_is_a_priority() -> None:
     what = shown()
-    bank = what.evident_bank(0, MASKS)
+    bank = what.bank(0, MASKED)
     readings = what.train.sensors[::7]
     for by in ("familiarity", "similarity"):
         tree, priority = BehaviourTree(bank, by)(readings), Priority(bank, by=by)
