@@ -186,7 +186,7 @@ class _Panel:
         self._drawn = max(self._drawn, tick)
         image = self._trail.copy()
         self._robot(ImageDraw.Draw(image), tick)
-        image = image.resize((image.width // self._FINE, image.height // self._FINE), Image.Resampling.BOX)
+        image = image.reduce(self._FINE)
         framed = Image.new("RGB", (image.width, image.height + self._HEAD + self._FOOT), PAPER)
         framed.paste(image, (0, self._HEAD))
         text = ImageDraw.Draw(framed)
