@@ -71,7 +71,11 @@ def test_behaviours_add_up() -> None:
 def test_the_files_that_it_names_are_there() -> None:
     for link in re.findall(r"\]\(((?!http)[^)]+)\)", README) + re.findall(r"`((?:\w+/)+[\w./]*)`", README):
         if not link.startswith("outputs/"):
-            assert (ROOT / link).exists(), link
+            path, _, part = link.partition("#")
+            assert (ROOT / path).exists(), link
+            headings = re.findall(r"^#+ (.*)$", (ROOT / path).read_text(), re.MULTILINE) if part else []
+            anchors = {re.sub(r"[^\w -]", "", heading).lower().replace(" ", "-") for heading in headings}
+            assert not part or part in anchors, link
 
 
 def test_the_commands_are_targets_of_make() -> None:
