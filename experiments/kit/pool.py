@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import lru_cache
-from importlib import import_module
 from typing import Any
 
 import cloudpickle
@@ -99,14 +98,6 @@ def processes(workers: int) -> Iterator[Executor | None]:
         return
     # Those of an earlier call are used again. Joblib keeps one pool; one of another class would break its next call.
     yield get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
-
-
-def begin_early(measure: Measure, workers: int) -> None:
-    """Start the processes of `measured`, which import what they need while this process does something else."""
-    with processes(workers) as executor:
-        if executor is not None and _backend() == "LokyBackend":
-            for _ in range(workers):
-                executor.submit(import_module, measure.__module__)
 
 
 def _begin(parent: int) -> None:

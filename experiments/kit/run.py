@@ -17,7 +17,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import torchvsa
 from experiments.kit import store
 from experiments.kit.page import Page
-from experiments.kit.pool import begin_early, measured
+from experiments.kit.pool import measured
 from experiments.kit.settings import check
 from experiments.kit.study import STUDIES, Outcome, Row, Study
 
@@ -38,7 +38,6 @@ def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
         done = f"{len(cells) - len(missing)} of {len(cells)} cells"
         console.print(f"{folder} holds {done} of these settings; fresh=true begins anew", soft_wrap=True)
     if missing:
-        begin_early(study.measure, settings.workers)
         with progress_bars(console) as progress:
             material = study.prepare(settings, folder, progress)
             task = progress.add_task("measure", total=len(missing))
