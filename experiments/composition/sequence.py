@@ -21,8 +21,9 @@ import sim
 from behaviours import Demonstrations, ErrorDriven
 from behaviours.learning import no_convergence_warnings
 from experiments.composition import sequence_paths
-from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, grid, setting
+from experiments.kit import Cell, Column, Drawing, Outcome, Page, Row, Settings, Study, Table, grid, setting
 from experiments.kit.intervals import bootstrap
+from experiments.kit.study import plain_page
 from experiments.tasks import corral
 from experiments.tasks import two_lamps as task
 from experiments.tasks.agreement import share_right
@@ -165,6 +166,12 @@ def headline(outcome: Outcome) -> str:
     return f"One vector goes to the blue lamp and then to the yellow one, which was never shown: {'; '.join(words)}."
 
 
+def page(page: Page, outcome: Outcome, study: Study) -> None:
+    """The usual page, and an animation in each arena."""
+    plain_page(page, outcome, study)
+    sequence_paths.animations(page, outcome)
+
+
 TABLE = Table(
     "First blue, then yellow",
     [
@@ -212,6 +219,7 @@ study = Study(
     ],
     headline=headline,
     method=METHOD,
+    page=page,
     presets={"quick": QUICK},
     objective="lamp_room.vector.one_vector.success_rate",
 )  # fmt: skip

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 import pandas as pd
 
 import sim
 from behaviours import Sequencing
-from experiments.kit import Outcome
+from experiments.kit import Outcome, Page
 from experiments.kit.figures import BLUE, ORANGE, VERMILION
 from experiments.kit.store import write_frame
+from experiments.tasks.recorded import frame_of, steps_of
 from experiments.tasks.two_lamps import TASK, AskedOnce, speakers
 
 if TYPE_CHECKING:
@@ -26,10 +28,10 @@ SPEAKERS = {"to blue": BLUE, "to yellow": ORANGE}
 def write(folder: Path, arena: str, policy: Sequencing, seed: int, seconds: float) -> None:
     """Drive from the first starts, and keep the paths with the behaviour that speaks at each step."""
     driven = sim.rollout(AskedOnce(policy), arena, task=TASK, episodes=range(PATHS), seed=seed, seconds=seconds)
-    steps = driven.trajectory
-    columns = {"x": steps.x, "y": steps.y, "speaker": speakers(policy, driven)}
     success = np.repeat(driven.success, np.diff(driven.offsets))
-    paths = pd.DataFrame({"episode": driven.step_episode, "success": success, **columns})
+    paths = frame_of(driven.trajectory, TASK).assign(
+        episode=driven.step_episode, success=success, speaker=speakers(policy, driven)
+    )
     (folder / "paths").mkdir(exist_ok=True)
     write_frame(folder / "paths" / f"{arena}.parquet", paths)
 
@@ -59,3 +61,24 @@ def draw(outcome: Outcome) -> Figure:
     handles = [Line2D([], [], color=colour, label=name) for name, colour in SPEAKERS.items()]
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles))
     return figure
+
+
+def animations(page: Page, outcome: Outcome) -> None:
+    """An animation of the first kept start in each arena, coloured by the behaviour that speaks."""
+    section = page.section("Who speaks")
+    section.text(
+        "The first start in each arena, at four times the speed; below each picture the behaviour that speaks."
+    )
+    for arena in outcome.settings.arenas:
+        path = pd.read_parquet(outcome.folder / "paths" / f"{arena}.parquet")
+        draw = functools.partial(_animate, arena, path.loc[path.episode == 0])
+        section.animation(
+            f"animation_{arena}", draw, f"Animation in {arena}", "First to the blue lamp, then to the other."
+        )
+
+
+def _animate(arena: str, path: pd.DataFrame, file: BinaryIO) -> None:
+    from sim import render
+
+    where, steps = sim.find_arena(arena), steps_of(path, TASK)
+    render.animate_steps(steps, arena, file, where, path.speaker.tolist(), TASK, SPEAKERS, speed=4)

@@ -12,18 +12,24 @@ SENSORS = [sensor.name for sensor in sim.SENSORS]
 MOTORS = [actuator.name for actuator in sim.ACTUATORS]
 STEP = [field.name for field in fields(sim.Steps) if field.name not in ("sensors", "commands")]
 
+ONE_LIGHT = sim.Task()
 
-def frame_of(steps: sim.Steps) -> pd.DataFrame:
-    """A column for each field of the steps, each sensor and each wheel."""
+
+def frame_of(steps: sim.Steps, task: sim.Task = ONE_LIGHT) -> pd.DataFrame:
+    """A column for each field of the steps, each sensor of the task and each wheel."""
     frame = pd.DataFrame({name: getattr(steps, name) for name in STEP})
-    frame[SENSORS], frame[MOTORS] = steps.sensors, steps.commands
+    frame[_sensors(task)], frame[MOTORS] = steps.sensors, steps.commands
     return frame
 
 
-def steps_of(frame: pd.DataFrame) -> sim.Steps:
+def _sensors(task: sim.Task) -> list[str]:
+    return [sensor.name for sensor in task.sensors]
+
+
+def steps_of(frame: pd.DataFrame, task: sim.Task = ONE_LIGHT) -> sim.Steps:
     """The steps of a frame that has at least the columns of `frame_of`."""
     return sim.Steps(
-        sensors=frame[SENSORS].to_numpy(),
+        sensors=frame[_sensors(task)].to_numpy(),
         commands=frame[MOTORS].to_numpy(),
         **{name: frame[name].to_numpy() for name in STEP},
     )

@@ -6,7 +6,7 @@ import io
 import math
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -69,6 +69,7 @@ def animate_steps(
     arena: Arena,
     speakers: Sequence[str],
     task: Task | None = None,
+    colours: Mapping[str, str] = COLOURS,
     speed: float = 2.0,
     frames: int = 150,
 ) -> None:
@@ -79,8 +80,9 @@ def animate_steps(
         title: written above the picture.
         path: the file to write, whose folder must exist; or an open binary file.
         arena: where the robot drove.
-        speakers: a name for each step: what is written below the picture, and says the colour (see `COLOURS`).
+        speakers: a name for each step: what is written below the picture, and says the colour.
         task: says what the columns of the readings are; by default that of the arena.
+        colours: of the names; others are dark.
         speed: playback speed relative to real time.
         frames: maximum number of frames.
 
@@ -89,7 +91,7 @@ def animate_steps(
     """
     if len(steps) != len(speakers) or not len(steps):
         raise ValueError(f"{len(steps)} steps and {len(speakers)} speakers; expected one speaker per step")
-    panel = _Panel(steps, title, arena, Task.of(arena) if task is None else task, speakers)
+    panel = _Panel(steps, title, arena, Task.of(arena) if task is None else task, speakers, colours)
     _write_gif([panel], path, speed, frames)
 
 
@@ -140,14 +142,20 @@ class _Panel:
     _WIDTH, _FINE, _HEAD, _FOOT = 400, 2, 34, 24
 
     def __init__(
-        self, path: Steps, title: str, arena: Arena, task: Task, speakers: Sequence[str] | None = None
+        self,
+        path: Steps,
+        title: str,
+        arena: Arena,
+        task: Task,
+        speakers: Sequence[str] | None = None,
+        colours: Mapping[str, str] = COLOURS,
     ) -> None:
         self._path = path
         self._title = title
         if speakers is None:
             speakers = [_BEHAVIOUR_OF_RULE[rule] for rule in InOrder(task).rule(path.sensors, path.goal).tolist()]
         self._speakers = list(speakers)
-        self._colours = [COLOURS.get(name, INK) for name in self._speakers]
+        self._colours = [colours.get(name, INK) for name in self._speakers]
         self._lights = [task.pair(task.goals[goal]) for goal in path.goal.tolist()]
         left, right, bottom, top = extent(arena)
         self._scale = self._WIDTH * self._FINE / (right - left)

@@ -37,6 +37,7 @@ def test_a_robot_goes_to_the_lamp_that_was_never_demonstrated(tmp_path: Path) ->
         spoken = [name for name, before in zip(path.speaker, [None, *path.speaker], strict=False) if name != before]
         assert spoken == ["to blue", "to yellow"]
     assert (tmp_path / "figures" / "paths.png").is_file()
+    assert (tmp_path / "figures" / "animation_lamp_room.gif").read_bytes().startswith(b"GIF8")
 
 
 @pytest.mark.slow
