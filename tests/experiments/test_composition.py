@@ -19,6 +19,7 @@ from experiments.models.behaviour_tree import BehaviourTree
 from experiments.tasks import corral
 from experiments.tasks.asked_once import EachAskedOnce
 from experiments.tasks.behaviours import BEHAVIOURS, Precedence
+from torchvsa.registry import Registry
 
 SMALL = ("vsa.dim=512", "demonstrations=6", "heldout=3", "codebooks=2", "seconds=12")
 
@@ -98,11 +99,14 @@ def test_each_start_drives_with_its_own_codebook() -> None:
         assert torch.equal(commands[codebook::2], own)
 
 
-def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path) -> None:
+def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def retreat(readings: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return readings[:, 2] < 0.06, np.tile([-1.0, -0.5], (len(readings), 1))
 
-    BEHAVIOURS.register("retreat", retreat)
+    # For this test only: other tests compare all names with the docs.
+    known = Registry("behaviour", {**BEHAVIOURS, "retreat": retreat})
+    for module in ("experiments.tasks.behaviours", "experiments.composition.settings"):
+        monkeypatch.setattr(f"{module}.BEHAVIOURS", known)
     settings = composed(
         study, *SMALL, "behaviours=[retreat,seek_light,avoid,cruise]", "rows=[teacher,sequencing]",
         "bullet_rows=[]", "arenas=[large]", "starts=5", "seconds=8", "workers=1",
