@@ -80,8 +80,7 @@ class Material:
 
 def prepare(settings: Damaged, folder: Path, progress: Progress) -> Material:
     """Let the teacher drive in the arena of the settings."""
-    kinds = dict.fromkeys(line_of(name).bank for name in settings.rows)
-    shown = demonstrated(settings, progress).with_banks([kind for kind in kinds if kind], progress)
+    shown = demonstrated(settings, progress).with_banks(settings.rows, progress)
     where = corral.arena(settings.arena)
     asked = corral.drive_together(settings, "held out", shown.rules, range(settings.heldout), progress, where)
     return Material(settings, shown, corral.moving(asked))

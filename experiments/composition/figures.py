@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -12,7 +12,7 @@ import sim
 from experiments.composition.rows import line_of
 from experiments.kit import Outcome, Page
 from experiments.kit.figures import BLUE, GREY, ORANGE, VERMILION
-from experiments.tasks.recorded import steps_of
+from experiments.tasks.recorded import ONE_LIGHT, animate
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -59,7 +59,6 @@ def _heat(outcome: Outcome, column: str, beside: str | None) -> Figure:
 
 def paths(outcome: Outcome) -> Figure:
     """Paths in the arena large of every row whose paths were kept."""
-    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -73,8 +72,7 @@ def paths(outcome: Outcome) -> Figure:
         render.draw_corral(axes, sim.find_arena("large"))
         for _, path in frame.groupby("episode"):
             points = path[["x", "y"]].to_numpy()
-            pieces = np.stack([points[:-1], points[1:]], axis=1)
-            axes.add_collection(LineCollection(list(pieces), colors=_colours(path)[:-1], linewidths=1.0, zorder=3))
+            render.draw_path(axes, points, _colours(path), 1.0)
             if not path.success.iloc[0]:
                 axes.plot(*points[-1], "x", color=VERMILION, zorder=5)
         axes.set_title(name)
@@ -108,15 +106,8 @@ def animations(page: Page, outcome: Outcome) -> None:
     section.text("The same start in the arena large, at twice the speed; below each picture the behaviour that speaks.")
     for name, frame in found.items():
         path = frame.loc[frame.episode == ANIMATED]
-        draw = functools.partial(_animate, name, path)
+        draw = functools.partial(animate, path.replace({"speaker": {"": "nobody"}}), name, "large", ONE_LIGHT)
         section.animation(f"animation_{name}", draw, f"Animation of {name}", line_of(name).about)
-
-
-def _animate(name: str, path: pd.DataFrame, file: BinaryIO) -> None:
-    from sim import render
-
-    speakers = path.speaker.replace("", "nobody").tolist()
-    render.animate_steps(steps_of(path), name, file, sim.find_arena("large"), speakers)
 
 
 def _timeline(axes: Axes, name: str, path: pd.DataFrame) -> None:

@@ -15,14 +15,13 @@ from typing import Any
 
 import pandas as pd
 
-import sim
 from behaviours import Demonstrations, OneShot
 from experiments.composition import interference_figures as figures
 from experiments.composition import interference_tables as tables
 from experiments.composition import sums
+from experiments.composition.settings import Apart
 from experiments.kit import Cell, Drawing, Part, Row, Study, grid, part, parts, setting
 from experiments.tasks import corral
-from experiments.tasks.behaviours import BEHAVIOURS
 
 MARGINS = (0.0, 1.0, 2.0, 5.0, 10.0)
 LEARNERS: dict[str, dict[str, Any]] = {
@@ -41,10 +40,9 @@ REPAIRS: dict[str, dict[str, Any]] = {
 
 
 @dataclass
-class Interference(corral.Learning):
+class Interference(Apart):
     """The settings of this study."""
 
-    encoder: Part = part("encoder", "level_wide", "the code of one reading")
     rule: Part = part("rule", "error_driven", "how the programs of the sum are learned that is explained and repaired")
     rows: list[str] = setting(list(LEARNERS), "learning rules, of those below", distinct=True, empty=True)
     learners: dict[str, Any] = setting(LEARNERS, "options of a rule, by the name of a row")
@@ -54,13 +52,7 @@ class Interference(corral.Learning):
         list(sums.SOURCES), "where joint samples are drawn: anywhere, or where several behaviours know the condition",
         choices=sums.SOURCES, distinct=True,
     )  # fmt: skip
-    behaviours: list[str] = setting(
-        list(sim.BEHAVIOURS), "what is learned apart; where several fire, the first of these is shown",
-        choices=lambda: BEHAVIOURS, distinct=True,
-    )  # fmt: skip
     draws: int = setting(3, "draws of the joint samples, for each draw of the codebooks", low=1)
-    codebooks: int = setting(10, "draws of the codebooks", low=1)
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
     heldout: int = setting(200, "episodes of the teacher about which programs are asked", low=1)
 
 

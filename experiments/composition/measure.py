@@ -49,6 +49,19 @@ class Moments:
     cell: NDArray[np.int64]
     avoid: NDArray[np.bool_]
 
+    def agreement(self, right: NDArray[np.bool_]) -> Row:
+        """Agreement, given the moments `[M]` answered as the teacher does: of all, where it avoids, and by cell.
+
+        `agreement_distinct` counts each condition once.
+        """
+        by_cell = np.bincount(self.cell, right * self.count) / np.bincount(self.cell, self.count)
+        avoid = self.avoid
+        return {
+            "agreement": float(np.average(right, weights=self.count)),
+            "agreement_avoid": float(np.average(right[avoid], weights=self.count[avoid])) if avoid.any() else None,
+            "agreement_distinct": float(by_cell.mean()),
+        }
+
     @property
     def ceiling(self) -> float:
         """The agreement of the best function of the bins."""
@@ -70,8 +83,7 @@ class Material:
 
 def prepare(settings: Composition, folder: Path, progress: Progress) -> Material:
     """Let the teacher demonstrate in `default`, and drive held-out starts in every arena."""
-    kinds = dict.fromkeys(line_of(name).bank for name in [*settings.rows, *settings.bullet_rows])
-    shown = demonstrated(settings, progress).with_banks([kind for kind in kinds if kind], progress)
+    shown = demonstrated(settings, progress).with_banks([*settings.rows, *settings.bullet_rows], progress)
     moments = {}
     for name in settings.arenas:
         what, asked = f"held out in {name}", range(settings.heldout)
@@ -144,19 +156,8 @@ def starts(settings: Composition, cell: Cell, arena: str) -> int:
 
 
 def agreement(controller: Any, moments: Moments) -> Row:
-    """The share of the teacher's moments with the teacher's commands: of all, of those in which it avoids, and by cell.
-
-    `agreement_distinct` counts each condition once; `ceiling` is the best that a function of the bins could reach.
-    """
-    right = agreeing.right(controller, moments.shown)
-    by_cell = np.bincount(moments.cell, right * moments.count) / np.bincount(moments.cell, moments.count)
-    avoid = moments.avoid
-    return {
-        "agreement": float(np.average(right, weights=moments.count)),
-        "agreement_avoid": float(np.average(right[avoid], weights=moments.count[avoid])) if avoid.any() else None,
-        "agreement_distinct": float(by_cell.mean()),
-        "ceiling": moments.ceiling,
-    }
+    """The shares of `Moments.agreement` for a controller, and the best that a function of the bins could reach."""
+    return {**moments.agreement(agreeing.right(controller, moments.shown)), "ceiling": moments.ceiling}
 
 
 def write_paths(folder: Path, row: str, made: list[Any], runs: list[sim.Rollout], starts: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -95,8 +95,9 @@ class Shown:
             bank.learn_apart(self.apart, parts.rule(settings.evident), sensors=masks)
         return bank
 
-    def with_banks(self, kinds: Sequence[str], progress: Progress) -> Shown:
-        """The same, with the banks of these kinds learned for each draw of the codebooks, on all workers."""
+    def with_banks(self, rows: Iterable[str], progress: Progress) -> Shown:
+        """The same, with the banks of these rows learned for each draw of the codebooks, on all workers."""
+        kinds = dict.fromkeys(kind for name in rows if (kind := line_of(name).bank) is not None)
         wanted = list(itertools.product(kinds, range(self.settings.codebooks)))
         task = progress.add_task("learn apart", total=len(wanted))
         banks = {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -14,7 +14,7 @@ from behaviours import Sequencing
 from experiments.kit import Outcome, Page
 from experiments.kit.figures import BLUE, ORANGE, VERMILION
 from experiments.kit.store import write_frame
-from experiments.tasks.recorded import frame_of, steps_of
+from experiments.tasks.recorded import animate, frame_of
 from experiments.tasks.two_lamps import TASK, AskedOnce, speakers
 
 if TYPE_CHECKING:
@@ -38,7 +38,6 @@ def write(folder: Path, arena: str, policy: Sequencing, seed: int, seconds: floa
 
 def draw(outcome: Outcome) -> Figure:
     """Paths of the first codebook's vector in each arena, coloured by the behaviour that speaks."""
-    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
     from matplotlib.lines import Line2D
 
@@ -50,9 +49,7 @@ def draw(outcome: Outcome) -> Figure:
         render.draw_corral(axes, sim.find_arena(arena))
         for _, path in pd.read_parquet(outcome.folder / "paths" / f"{arena}.parquet").groupby("episode"):
             points = path[["x", "y"]].to_numpy()
-            pieces = np.stack([points[:-1], points[1:]], axis=1)
-            colours = [SPEAKERS[name] for name in path.speaker[:-1]]
-            axes.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.3, zorder=3))
+            render.draw_path(axes, points, [SPEAKERS[name] for name in path.speaker], 1.3)
             axes.plot(*points[0], "o", markersize=5, markerfacecolor="white", markeredgecolor="black", zorder=5)
             if not path.success.iloc[0]:
                 axes.plot(*points[-1], "X", markersize=8, color=VERMILION, zorder=6)
@@ -71,14 +68,7 @@ def animations(page: Page, outcome: Outcome) -> None:
     )
     for arena in outcome.settings.arenas:
         path = pd.read_parquet(outcome.folder / "paths" / f"{arena}.parquet")
-        draw = functools.partial(_animate, arena, path.loc[path.episode == 0])
+        draw = functools.partial(animate, path.loc[path.episode == 0], arena, arena, TASK, colours=SPEAKERS, speed=4)
         section.animation(
             f"animation_{arena}", draw, f"Animation in {arena}", "First to the blue lamp, then to the other."
         )
-
-
-def _animate(arena: str, path: pd.DataFrame, file: BinaryIO) -> None:
-    from sim import render
-
-    where, steps = sim.find_arena(arena), steps_of(path, TASK)
-    render.animate_steps(steps, arena, file, where, path.speaker.tolist(), TASK, SPEAKERS, speed=4)

@@ -14,19 +14,25 @@ ARENAS = ["default", "narrow", "large", "offset_lamp", "clutter", "two_gaps"]
 
 
 @dataclass
-class Combining(corral.Learning):
-    """How behaviours are learned apart and combined; several studies share it."""
+class Apart(corral.Learning):
+    """How behaviours are demonstrated and learned apart."""
 
     encoder: Part = part("encoder", "level_wide", "the code of one reading")
-    paper: corral.Paper = settings(corral.Paper, "the row paper_sum: the printed algorithms, read literally")
-    evident: Part = part("rule", "evident", "how evident_sum learns: silent where only others know, louder by evidence")
-    precedence: float = setting(2.4, "masked_sum: how much louder seek_light is than the others", above=0)
     behaviours: list[str] = setting(
         list(sim.BEHAVIOURS), "what is learned apart; where several fire, the first of these is shown",
         choices=lambda: BEHAVIOURS, distinct=True,
     )  # fmt: skip
     demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
-    codebooks: int = setting(10, "draws of the codebooks; start e drives with codebook e mod this number", low=1)
+    codebooks: int = setting(10, "draws of the codebooks; a start e is driven with codebook e mod this number", low=1)
+
+
+@dataclass
+class Combining(Apart):
+    """How they are combined; several studies share it."""
+
+    paper: corral.Paper = settings(corral.Paper, "the row paper_sum: the printed algorithms, read literally")
+    evident: Part = part("rule", "evident", "how evident_sum learns: silent where only others know, louder by evidence")
+    precedence: float = setting(2.4, "masked_sum: how much louder seek_light is than the others", above=0)
 
 
 @dataclass

@@ -16,7 +16,7 @@ from behaviours import Behaviour, BehaviourBank, Demonstrations, Rule
 from behaviours.ordered import distinct_rows
 from experiments.composition.measure import Moments, distinct
 from experiments.composition.rows import Shown, demonstrated
-from experiments.composition.settings import Combining
+from experiments.composition.settings import Apart, Combining
 from experiments.kit import Cell, Row, parts
 from experiments.tasks import corral
 
@@ -61,8 +61,7 @@ class Material:
 
 def combining(settings: Interference) -> Combining:
     """The settings with which the behaviours are demonstrated and learned apart."""
-    shared = [field.name for field in fields(corral.Learning)] + ["behaviours", "demonstrations", "codebooks"]
-    return Combining(**{name: getattr(settings, name) for name in shared})
+    return Combining(**{field.name: getattr(settings, field.name) for field in fields(Apart)})
 
 
 def prepare(settings: Interference, folder: Path, progress: Any) -> Material:
@@ -110,12 +109,9 @@ class Questions:
     def shares(self, right: NDArray[np.bool_]) -> Row:
         """Agreement, also where the teacher avoids and by cell; and the wrong moments by who knows the condition."""
         moments, knowers = self.given.moments, self.given.knowers
-        count, avoid = moments.count, moments.avoid
-        by_cell = np.bincount(moments.cell, right * count) / np.bincount(moments.cell, count)
+        count = moments.count
         return {
-            "agreement": float(np.average(right, weights=count)),
-            "agreement_avoid": float(np.average(right[avoid], weights=count[avoid])) if avoid.any() else None,
-            "agreement_distinct": float(by_cell.mean()),
+            **moments.agreement(right),
             **{f"wrong_{who}": float(count[~right & (knowers == who)].sum() / count.sum()) for who in KNOWERS},
         }
 

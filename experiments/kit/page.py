@@ -48,7 +48,7 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class Pending:
     """A picture that is still to be drawn: its file's name, the function that returns its bytes, its data as CSV."""
 
     name: str
@@ -93,13 +93,13 @@ class Section:
         holds the traceback.
         """
         table = "" if data is None else data.to_csv(index=False)
-        drawing = Drawing(name, f"{name}.png", functools.partial(drawn, draw), table)
-        self.blocks.append(Block("drawing", drawing, caption, alt))
+        pending = Pending(name, f"{name}.png", functools.partial(drawn, draw), table)
+        self.blocks.append(Block("pending", pending, caption, alt))
 
     def animation(self, name: str, draw: Callable[[BinaryIO], None], alt: str, caption: str = "") -> None:
         """Add a GIF that `draw` writes to an open file; it is kept as `figures/{name}.gif`, see `figure`."""
-        drawing = Drawing(name, f"{name}.gif", functools.partial(_written, draw))
-        self.blocks.append(Block("drawing", drawing, caption, alt))
+        pending = Pending(name, f"{name}.gif", functools.partial(_written, draw))
+        self.blocks.append(Block("pending", pending, caption, alt))
 
     def code(self, text: str, caption: str = "") -> None:
         """Add text to be copied: a command, settings."""
@@ -132,27 +132,27 @@ class Page:
             (section, place, block.content)
             for section in self.sections
             for place, block in enumerate(section.blocks)
-            if isinstance(block.content, Drawing)
+            if isinstance(block.content, Pending)
         ]
-        draws = [drawing.draw for _, _, drawing in waiting]
+        draws = [pending.draw for _, _, pending in waiting]
         # Another process takes as long to start as two figures to draw.
         workers = min(workers, -(-len(draws) // 2))
         found = dict(measured(_bytes_or_error, draws, range(len(draws)), workers)) if draws else {}
-        for number, (section, place, drawing) in enumerate(waiting):
-            section.blocks[place] = self._drawn(section.blocks[place], drawing, *found[number])
+        for number, (section, place, pending) in enumerate(waiting):
+            section.blocks[place] = self._drawn(section.blocks[place], pending, *found[number])
 
-    def _drawn(self, block: Block, drawing: Drawing, content: bytes, error: str, trace: str) -> Block:
+    def _drawn(self, block: Block, pending: Pending, content: bytes, error: str, trace: str) -> Block:
         """The picture that was drawn, kept in the folder; or why there is none."""
         if error:
-            self.failures[drawing.name] = trace
-            return Block("text", f"The figure `{drawing.name}` could not be drawn: {error}")
+            self.failures[pending.name] = trace
+            return Block("text", f"The figure `{pending.name}` could not be drawn: {error}")
         if self.folder is not None:
             figures = self.folder / "figures"
             figures.mkdir(exist_ok=True)
-            write_atomically(figures / drawing.file, content)
-            if drawing.table:
-                write_atomically(figures / f"{drawing.name}.csv", drawing.table.encode())
-        link = f"data:text/csv;base64,{base64.b64encode(drawing.table.encode()).decode()}" if drawing.table else ""
+            write_atomically(figures / pending.file, content)
+            if pending.table:
+                write_atomically(figures / f"{pending.name}.csv", pending.table.encode())
+        link = f"data:text/csv;base64,{base64.b64encode(pending.table.encode()).decode()}" if pending.table else ""
         return self.picture(content, block.alt, block.caption, link)
 
     def picture(self, content: bytes, alt: str, caption: str = "", data: str = "") -> Block:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any, BinaryIO
 
 import pandas as pd
 
@@ -33,3 +34,11 @@ def steps_of(frame: pd.DataFrame, task: sim.Task = ONE_LIGHT) -> sim.Steps:
         commands=frame[MOTORS].to_numpy(),
         **{name: frame[name].to_numpy() for name in STEP},
     )
+
+
+def animate(path: pd.DataFrame, title: str, arena: str, task: sim.Task, file: BinaryIO, **looks: Any) -> None:
+    """Write a GIF of a frame of `frame_of` with the column `speaker`; `looks` as in `sim.render.animate_steps`."""
+    from sim import render
+
+    where = sim.find_arena(arena)
+    render.animate_steps(steps_of(path, task), title, file, where, path.speaker.tolist(), task, **looks)

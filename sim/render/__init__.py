@@ -4,7 +4,7 @@
 """
 
 from sim.render.animation import animate, animate_steps, typical
-from sim.render.pictures import COLOURS, INK, LAMPS, PAPER, WALL, draw_corral, draw_rollout
+from sim.render.pictures import COLOURS, INK, LAMPS, PAPER, WALL, draw_corral, draw_path, draw_rollout
 
 __all__ = [
     "COLOURS",
@@ -15,6 +15,7 @@ __all__ = [
     "animate",
     "animate_steps",
     "draw_corral",
+    "draw_path",
     "draw_rollout",
     "typical",
 ]

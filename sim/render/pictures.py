@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Rectangle
+from numpy.typing import NDArray
 
 from sim.arena import Arena
 from sim.result import Rollout
@@ -39,6 +40,14 @@ def draw_corral(ax: Axes, arena: Arena) -> None:
     ax.set_axis_off()
 
 
+def draw_path(
+    ax: Axes, points: NDArray[np.float64], colours: Sequence[str], width: float, alpha: float | None = None
+) -> None:
+    """Draw a path through `points` `[N, 2]`, each piece in the colour of the point at which it begins."""
+    pieces = np.stack([points[:-1], points[1:]], axis=1)
+    ax.add_collection(LineCollection(list(pieces), colors=list(colours[:-1]), linewidths=width, alpha=alpha, zorder=3))
+
+
 def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = None, legend: bool = True) -> None:
     """Draw a corral and trajectories, coloured by the behaviour that the teacher would choose.
 
@@ -57,10 +66,8 @@ def draw_rollout(ax: Axes, rollout: Rollout, episodes: Iterable[int] | None = No
     for episode in rollout.episode[:12].tolist() if episodes is None else episodes:
         path = rollout.slice(episode)
         points = np.stack([path.x, path.y], axis=1)
-        pieces = np.stack([points[:-1], points[1:]], axis=1)
         rules = InOrder(rollout.task).rule(path.sensors, path.goal)
-        colours = [_COLOUR_OF_RULE[rule] for rule in rules[:-1].tolist()]
-        ax.add_collection(LineCollection(list(pieces), colors=colours, linewidths=1.1, alpha=0.75, zorder=3))
+        draw_path(ax, points, [_COLOUR_OF_RULE[rule] for rule in rules.tolist()], 1.1, 0.75)
         # A robot that avoids an obstacle turns on the spot, which a line does not show.
         turns = points[rules == _AVOID]
         ax.scatter(turns[:, 0], turns[:, 1], s=9, color=COLOURS["avoid"], lw=0, zorder=4)
