@@ -99,7 +99,7 @@ def _holographic(stored: Stored) -> Score:
     # 1 / √(d - 2): by a cosine as large as that of a few summands the normal approximation would be off.
     k = stored.count
     if not stored.bound:
-        return Score(math.atanh(1 / math.sqrt(k)), 1.0, 2) if k > 1 else Score(math.inf, 0.0)
+        return Score(math.atanh(1 / math.sqrt(k)), 1.0, 2) if k > 1 else Score(1.0, 0.0)
     power = k + 1  # unbinding doubles the power of the right pair
     variance = 1 - 2 / power + 4 / power**3
     return Score(math.atanh(1 / math.sqrt(power)), math.sqrt(variance) / (1 - 1 / power), 2)
