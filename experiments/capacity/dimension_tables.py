@@ -24,7 +24,7 @@ def summarise(settings: Any, records: pd.DataFrame, architectures: Sequence[str]
     """A row for each task and architecture: lines and what they are compared with, or similarities after unbinding."""
     table: list[Row] = []
     for cell in grid(task=[*TASKS, UNBINDING], architecture=architectures):
-        own = records[(records.task == cell["task"]) & (records.architecture == cell["architecture"])]
+        own: Any = records[(records.task == cell["task"]) & (records.architecture == cell["architecture"])]
         table.append({**cell, **(returned(own, cell) if cell["task"] == UNBINDING else lines(settings, own, cell))})
     return table
 
@@ -32,7 +32,7 @@ def summarise(settings: Any, records: pd.DataFrame, architectures: Sequence[str]
 def lines(settings: Any, own: pd.DataFrame, cell: Row) -> Row:
     """The line of what is needed, that of the published rule, the published one, and that of the closed form."""
     name, task = cell["architecture"], cell["task"]
-    ends = own.groupby("k")[["needed", "first"]].first().astype(float)
+    ends: Any = own.groupby("k")[["needed", "first"]].first().astype(float)
     row = line("", ends["needed"]) | line("grid_", ends["first"])
     if (known := published.LINES[task].get(name)) is not None:
         slope, start = known
@@ -102,8 +102,10 @@ def fitted(name: str) -> Any:
     """The format of a column that shows a line, and its value at k = 15."""
 
     def text(row: Row) -> str:
-        slope, start, at = (row.get(f"{name}{end}") for end in ("slope", "start", "at"))
-        return "-" if slope is None else f"{slope:.1f}k {'+' if start >= 0 else '-'} {abs(start):.1f}: {at:.0f}"
+        if row.get(f"{name}slope") is None:
+            return "-"
+        slope, start, at = (row[f"{name}{end}"] for end in ("slope", "start", "at"))
+        return f"{slope:.1f}k {'+' if start >= 0 else '-'} {abs(start):.1f}: {at:.0f}"
 
     return text
 

@@ -11,7 +11,7 @@ import pytest
 from commands import only, results, shared_output_of
 from kits import composed
 
-from experiments.capacity import Capacity, made, measure, study
+from experiments.capacity.study import Capacity, made, measure, study
 from experiments.kit.run import check_all
 from experiments.main import main
 from experiments.tasks.random_pairs import CONDITIONS, bracket, expected, halve, predicted, random_pairs, recalled

@@ -102,7 +102,7 @@ def drawn(name: str, dim: int, k: int, items: int, trials: int, kind: str, raw: 
             noisy = np.fft.ifft(np.fft.fft(program) * spectra.conj()).real if name == "HRR" else program * keys.conj()
         else:
             noisy = program[None]
-        scores = (noisy @ atoms.conj().T).real / np.linalg.norm(atoms, axis=1)
+        scores = np.real(noisy @ atoms.conj().T) / np.linalg.norm(atoms, axis=1)
         if kind == "pairs":
             right += np.mean(scores.argmax(1) == own)
         else:
