@@ -4,7 +4,7 @@ from torchvsa import encoders
 from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
 from torchvsa.capacity import dim_needed, pairs_held, recall_probability
 from torchvsa.errors import ShapeError
-from torchvsa.memory import CleanUp, Match
+from torchvsa.memory import CleanUp, Factors, Match, Resonator
 from torchvsa.part import Part
 from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected, protection
 from torchvsa.readout import Readout
@@ -20,11 +20,13 @@ __all__ = [
     "PROTECTIONS",
     "VSA",
     "CleanUp",
+    "Factors",
     "FixedShift",
     "Match",
     "Part",
     "Protection",
     "Readout",
+    "Resonator",
     "SelfShift",
     "ShapeError",
     "Unprotected",

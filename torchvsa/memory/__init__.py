@@ -1,5 +1,6 @@
 """Memories of hypervectors."""
 
 from torchvsa.memory.cleanup import CleanUp, Match, best
+from torchvsa.memory.resonator import Factors, Resonator
 
-__all__ = ["CleanUp", "Match", "best"]
+__all__ = ["CleanUp", "Factors", "Match", "Resonator", "best"]
