@@ -21,7 +21,7 @@ _MOST_CELLS = 2**20
 """The most cells that the plain search asks: about a minute at d = 4,000."""
 _SLAB = 2**12
 """The most cells that a range grows by at once; further sensors keep the bin that was found."""
-_TRIES = 16
+_TRIES = 8
 """Searches per round, with noise of their own; each may find another reading."""
 _IDLE = 3
 """Rounds without another reading after which the search ends."""
@@ -39,7 +39,10 @@ class Rule(NamedTuple):
     high: tuple[float, ...]
     """The upper end."""
     strength: float
-    """How often the reading that the box grew from is present in the program; NaN if the program was only asked."""
+    """How often the reading that the box grew from is present in the program; NaN if the program was only asked.
+
+    A condition that was taught once has 1; with two results whose codes are opposite, 1/2.
+    """
     cells: int
     """The number of cells (combinations of bins) in the box."""
 
@@ -143,7 +146,8 @@ def explain_command(
         return (space.schema.command_levels(recall.commands) == levels).all(1)
 
     if method == "table":
-        found, strengths = _asked(ask, bins), None
+        strengths = None
+        found, ask = _asked(ask, bins)
     elif method == "resonator":
         found, strengths = _factored(behaviour, label, bins, used, most, seed)
     else:
@@ -165,13 +169,15 @@ def explain_command(
     return Rules(space.schema, tuple(shown), tuple(rules), found.where(used, -1), right)
 
 
-def _asked(ask: Ask, bins: Int64[Tensor, "n"]) -> Int64[Tensor, "k n"]:
-    """All cells that answer so, in order."""
+def _asked(ask: Ask, bins: Int64[Tensor, "n"]) -> tuple[Int64[Tensor, "k n"], Ask]:
+    """All cells that answer so, in order, and a function that knows it of each."""
     count = int(bins.to(torch.float64).prod().clamp(max=2.0**62))
     if count > _MOST_CELLS:
         raise ValueError(f"the plain search asks every cell, at most {_MOST_CELLS:,}; this space has {count:,}")
     cells = torch.cartesian_prod(*(torch.arange(int(number)) for number in bins)).reshape(count, -1)
-    return torch.cat([part[ask(part)] for part in cells.split(_SLAB)])
+    gives = torch.cat([ask(part) for part in cells.split(_SLAB)])
+    grid = gives.reshape(bins.tolist())
+    return cells[gives], lambda cells: grid[cells.unbind(1)]
 
 
 def _factored(
@@ -190,14 +196,15 @@ def _factored(
     books = [table[column, : int(bins[column])] for column in columns]
     whole = space.protect.invert(vsa.unbind(_wide(behaviour.program.detach()), _dual(behaviour, label)))
     least = _CHANCE / vsa.dim**0.5
-    network = Resonator(vsa, books, steps=200, noise=0.5, threshold=1.5, accept=least)
+    network = Resonator(vsa, books, steps=60, noise=0.5, threshold=1.5, accept=least)
     generator = torch.Generator().manual_seed(seed)
     cells = torch.zeros(0, len(columns), dtype=torch.int64)
     strengths, rest = torch.zeros(0), whole
     idle = 0
     for _ in range(4 * most):
         factors = network(rest.expand(_TRIES, -1), generator)
-        new = factors.indices[factors.similarity >= least].unique(dim=0)
+        # Readings with other commands can be present with a negative weight; they are explained away too.
+        new = factors.indices[factors.similarity.abs() >= least].unique(dim=0)
         fresh = (new[:, None] != cells).any(-1).all(1)
         idle = 0 if fresh.any() else idle + 1
         if idle == _IDLE:
@@ -210,6 +217,7 @@ def _factored(
         weights = torch.linalg.lstsq(codes.T, whole[:, None], driver="gelsd").solution[:, 0]
         rest, strengths = whole - weights @ codes, weights.real if weights.is_complex() else weights
     order = strengths.argsort(descending=True, stable=True)
+    order = order[strengths[order] > 0]
     found = torch.zeros(len(cells), len(bins), dtype=torch.int64)
     found[:, columns] = cells
     return found[order], strengths[order].float()

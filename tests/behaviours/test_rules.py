@@ -36,12 +36,13 @@ def test_every_reading_of_a_rule_gives_the_command(learned: Any) -> None:
     assert strengths == sorted(strengths, reverse=True)
 
 
-def test_the_plain_search_misses_none(learned: Any) -> None:
+def test_the_plain_search_misses_none() -> None:
+    learned = ErrorDriven().fit(Space(SCHEMA, Product(Level(MAP(500, dtype=torch.int8), 8), 3)), SHOWN)
     found = explain_command(learned, TURN, "table", most=10**6)
     asked = readings(3000, seed=7)
     gives = (learned(asked).commands == torch.tensor(TURN)).all(1)
     assert torch.equal(found.covers(asked), gives)
-    grid = (torch.cartesian_prod(*[torch.arange(16)] * 3) + 0.5) / 16 * torch.tensor([4.0, 4.0, 0.6])
+    grid = (torch.cartesian_prod(*[torch.arange(8)] * 3) + 0.5) / 8 * torch.tensor([4.0, 4.0, 0.6])
     assert len(found.found) == int((learned(grid).commands == torch.tensor(TURN)).all(1).sum())
 
 
@@ -50,7 +51,7 @@ def test_a_taught_rule_is_said_in_a_sentence() -> None:
         [Sensor("distance", 0, 8, "m"), Sensor("bumper", kind="binary")], [Actuator("speed", -1, 1, "m/s", levels=2)]
     )
     space = Space(schema, Product([Lookup(VSA, 8), Lookup(VSA, 2)]))
-    x = torch.cartesian_prod(torch.arange(8) + 0.5, torch.arange(2))
+    x = torch.cartesian_prod(torch.arange(8) + 0.5, torch.arange(2.0))
     behaviour = OneShot().fit(space, Demonstrations(x, torch.where((x[:, :1] < 3) | (x[:, 1:] == 1), -1.0, 1.0)))
     for method in ("resonator", "table"):
         found = explain_command(behaviour, [1], method)
@@ -60,15 +61,15 @@ def test_a_taught_rule_is_said_in_a_sentence() -> None:
         assert found.rules[0][:2] == ((3, 0), (8, 0))
         assert found.rules[0].cells == 5
         assert math.isnan(found.rules[0].strength) == (method == "table")
-    # Each of the five conditions is taught once.
-    assert explain_command(behaviour, [1]).rules[0].strength == pytest.approx(1, abs=0.4)
+    # Each of the five conditions is taught once, and the codes of the two results are opposite.
+    assert explain_command(behaviour, [1]).rules[0].strength == pytest.approx(0.5, abs=0.1)
 
 
 def test_phases_are_factored_too_and_the_seed_decides() -> None:
-    behaviour = OneShot().fit(Space(SCHEMA, Product(Lookup(FHRR(2000), 16), 3)), SHOWN.where(torch.arange(60) < 20))
-    found, again = (explain_command(behaviour, TURN, seed=3) for _ in range(2))
+    behaviour = OneShot().fit(Space(SCHEMA, Product(Lookup(FHRR(600), 8), 3)), SHOWN.where(torch.arange(60) < 20))
+    found, again = (explain_command(behaviour, TURN, most=3, seed=3) for _ in range(2))
     assert found.right.all()
-    assert len(found.found) > 3
+    assert len(found.found) > 1
     assert found.rules == again.rules
 
 
