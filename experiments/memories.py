@@ -108,7 +108,7 @@ def curves(outcome: Outcome) -> Figure:
     for column, count in enumerate(settings.items):
         for line, measured in enumerate(("accuracy", "completed")):
             axes = panels[line][column]
-            own = frame[frame["items"] == count]
+            own = frame.loc[frame["items"] == count]
             lines(axes, own, "noise", measured, "memory", order=settings.memories)
             axes.set(xlabel="flipped" if line else "", title="" if line else f"{count:,} items")
             axes.set_ylabel(("share right", "similarity of the completed state")[line])

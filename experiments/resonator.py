@@ -1,8 +1,7 @@
 """How large a set of products does a resonator network factor?
 
 Products of one item from each of F codebooks of K random items of -1 / +1 are factored, K^F products in all. The
-largest K with 99 % right, within .001 K^F steps, is searched, as Kent et al. 2020 define operational capacity, and
-compared with what they measured. The stochastic variant is that of Langenegger et al. 2023.
+largest K with 99 % right is searched, the operational capacity, and compared with what Kent et al. 2020 measured. The stochastic variant is that of Langenegger et al. 2023.
 
     torchvsa resonator
     torchvsa resonator dims=[1000] factors=[2] variants=[plain]
@@ -47,7 +46,7 @@ class Capacity(Settings):
     accuracy: float = setting(0.99, "share of products to be factored", above=0, below=1)
     trials: int = setting(200, "products per codebook size", low=1)
     draws: int = setting(4, "draws of the codebooks among them", low=1)
-    most_steps: int = setting(1000, "upper limit of the steps", low=1)
+    steps: int = setting(1000, "the largest number of steps", low=1)
     precision: float = setting(0.05, "largest gap above the size found, as a share of it", low=0, below=1)
 
 
@@ -61,7 +60,6 @@ def cells(settings: Capacity) -> list[Cell]:
 def share(settings: Capacity, cell: Cell, size: int) -> float:
     """The share of products that are factored; an upper bound of it once it is below the accuracy for certain."""
     factors, vsa = cell["factors"], MAP(cell["dim"], dtype=torch.int8)
-    steps = min(max(round(0.001 * size**factors), 20), settings.most_steps)
     seed = np.random.SeedSequence([settings.seed, factors, cell["dim"], size]).generate_state(1)[0]
     generator = torch.Generator().manual_seed(int(seed))
     wrong, each = 0, -(-settings.trials // settings.draws)
@@ -69,7 +67,7 @@ def share(settings: Capacity, cell: Cell, size: int) -> float:
         books = vsa.random(factors, size, generator=generator).unbind(0)
         index = torch.randint(size, (each, factors), generator=generator)
         bound = reduce(vsa.bind, [book[column] for book, column in zip(books, index.unbind(1), strict=True)])
-        found = Resonator(vsa, books, steps=steps, **VARIANTS[cell["variant"]])(bound, generator)
+        found = Resonator(vsa, books, steps=settings.steps, **VARIANTS[cell["variant"]])(bound, generator)
         wrong += int((found.indices != index).any(1).sum())
         if 1 - wrong / (each * settings.draws) < settings.accuracy:
             break
@@ -118,7 +116,7 @@ def curves(outcome: Outcome) -> Figure:
     panels = figure.subplots(1, len(outcome.settings.factors), squeeze=False)[0]
     frame = pd.DataFrame(outcome.table)
     for factors, axes in zip(outcome.settings.factors, panels, strict=True):
-        own = frame[frame.factors == factors]
+        own = frame.loc[frame.factors == factors]
         lines(axes, own, "dim", "products", "variant", order=outcome.settings.variants)
         dims, sizes = zip(*PUBLISHED[factors].items(), strict=True)
         axes.plot(dims, [float(size) ** factors for size in sizes], "x", color=BLACK, label="Kent et al. 2020")
@@ -142,11 +140,11 @@ TABLE = Table(
 METHOD = """
 Codebooks are random, of equal size. A product counts as factored if all items are right. The size is searched: from a
 guess up or down by a quarter until one size holds and one fails, then by halving until they are within `precision`; the
-smaller is reported. Steps are limited to .001 K^F, at least 20 and at most `most_steps`, which is less than the
-published limit from K^F = 1,000 `most_steps` on.
+smaller is reported. Both variants have the same limit of steps; the published one is .001 K^F, which is less below
+a million products and more above.
 """
 FIGURE = Drawing("resonator", curves, "products that are factored against d, for each number of factors")
-QUICK = {"dims": [100, 200], "factors": [2, 3], "trials": 40, "draws": 2, "precision": 0.2, "most_steps": 200}
+QUICK = {"dims": [100, 200], "factors": [2, 3], "trials": 40, "draws": 2, "precision": 0.2, "steps": 400}
 
 study = Study(
     name="resonator",

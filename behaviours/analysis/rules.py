@@ -147,12 +147,13 @@ def explain_command(
 
     if method == "table":
         strengths = None
-        found, ask = _asked(ask, bins)
+        found, answers = _asked(ask, bins)
     elif method == "resonator":
         found, strengths = _factored(behaviour, label, bins, used, most, seed)
+        answers: Ask = ask
     else:
         raise ValueError(f"method is 'resonator' or 'table'; got {method!r}")
-    right = ask(found) if len(found) else torch.zeros(0, dtype=torch.bool)
+    right = answers(found) if len(found) else torch.zeros(0, dtype=torch.bool)
     boxes: list[tuple[Tensor, Tensor]] = []
     rules: list[Rule] = []
     for row in right.nonzero()[:, 0].tolist():
@@ -161,7 +162,7 @@ def explain_command(
             continue
         if len(rules) == most:
             break
-        low, high = _grown(ask, cell, bins)
+        low, high = _grown(answers, cell, bins)
         boxes.append((low, high))
         strength = math.nan if strengths is None else float(strengths[row])
         rules.append(Rule(*_ends(space.schema, used, bins, low, high), strength, int((high - low + 1).prod())))
