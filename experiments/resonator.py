@@ -1,7 +1,8 @@
 """How large a set of products does a resonator network factor?
 
 Products of one item from each of F codebooks of K random items of -1 / +1 are factored, K^F products in all. The
-largest K with 99 % right is searched, the operational capacity, and compared with what Kent et al. 2020 measured. The stochastic variant is that of Langenegger et al. 2023.
+largest K with 99 % right is searched, the operational capacity, and compared with what Kent et al. 2020 measured. The
+stochastic variant is that of Langenegger et al. 2023.
 
     torchvsa resonator
     torchvsa resonator dims=[1000] factors=[2] variants=[plain]
@@ -97,7 +98,7 @@ def summarise(settings: Capacity, records: pd.DataFrame) -> list[Row]:
             row = {**cell, "size": int(size), "products": float(size) ** cell["factors"]}
             if cell["variant"] == "plain":
                 row["published"] = PUBLISHED[cell["factors"]].get(cell["dim"])
-            elif (base := plain.get((cell["factors"], cell["dim"]))) is not None:
+            elif (base := plain.get((cell["factors"], cell["dim"]), 1)) > 1:  # nothing was factored with one item
                 row["gain"] = (float(size) / base) ** cell["factors"]
             table.append(row)
     return table

@@ -45,6 +45,6 @@ def test_the_commands_write_tables_and_pages(tmp_path: Path) -> None:
         assert only(folder, "report.html").read_text().count("data:image/png;base64,") == 1
         if name == "resonator":
             sizes = {(row["variant"], row["factors"]): row["products"] for row in table}
-            assert sizes["stochastic", 3] > sizes["plain", 3] > 100
+            assert sizes["stochastic", 2] > sizes["plain", 2] > 100
         else:
             assert {row["accuracy"] for row in table if row["memory"] == "clean_up"} == {1.0}
