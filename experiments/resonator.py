@@ -91,7 +91,11 @@ def measure(settings: Capacity, cell: Cell) -> Row:
 def summarise(settings: Capacity, records: pd.DataFrame) -> list[Row]:
     """A row for each cell, with the published size, and the gain of the stochastic variant in products."""
     table: list[Row] = []
-    plain = {(row.factors, row.dim): row["size"] for _, row in records.iterrows() if row.variant == "plain"}
+    plain = {
+        (row["factors"], row["dim"]): int(row["size"])
+        for row in records.to_dict("records")
+        if row["variant"] == "plain"
+    }
     for cell in grid(variant=settings.variants, factors=settings.factors, dim=settings.dims):
         own = records[(records.variant == cell["variant"]) & (records.factors == cell["factors"])]
         for size in own.loc[own.dim == cell["dim"], "size"]:
