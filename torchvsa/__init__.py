@@ -4,7 +4,16 @@ from torchvsa import encoders
 from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
 from torchvsa.capacity import dim_needed, pairs_held, recall_probability
 from torchvsa.errors import ShapeError
-from torchvsa.memory import CleanUp, Match
+from torchvsa.memory import (
+    MEMORIES,
+    ClassicalHopfield,
+    CleanUp,
+    Factors,
+    Hopfield,
+    Match,
+    Resonator,
+    SparseDistributedMemory,
+)
 from torchvsa.part import Part
 from torchvsa.protection import PROTECTIONS, FixedShift, Protection, SelfShift, Unprotected, protection
 from torchvsa.readout import Readout
@@ -17,16 +26,22 @@ __all__ = [
     "FHRR",
     "HRR",
     "MAP",
+    "MEMORIES",
     "PROTECTIONS",
     "VSA",
+    "ClassicalHopfield",
     "CleanUp",
+    "Factors",
     "FixedShift",
+    "Hopfield",
     "Match",
     "Part",
     "Protection",
     "Readout",
+    "Resonator",
     "SelfShift",
     "ShapeError",
+    "SparseDistributedMemory",
     "Unprotected",
     "architecture",
     "dim_needed",

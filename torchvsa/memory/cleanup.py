@@ -1,7 +1,7 @@
 """Clean-up memory: find the item that is most similar to a noisy hypervector."""
 
 from functools import partial
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import torch
 from jaxtyping import Float, Int, Shaped
@@ -11,6 +11,9 @@ from torchvsa._blocks import by_blocks
 from torchvsa._checks import readable
 from torchvsa._numerics import in_range, inner_products, norms, ordinary, over_lengths, units, widened
 from torchvsa.errors import ShapeError
+
+if TYPE_CHECKING:
+    from torchvsa.architectures.base import VSA
 
 _PRODUCT_BYTES = 2**27
 """Memory for products; more queries are answered in blocks."""
@@ -63,6 +66,11 @@ class CleanUp(nn.Module):
                 f"a clean-up memory needs items [K, d] with K and d at least 1; got shape {tuple(items.shape)}"
             )
         self.register_buffer("items", items)
+
+    @staticmethod
+    def supports(vsa: "VSA") -> bool:
+        """Whether the memory holds hypervectors of this architecture: of every one."""
+        return True
 
     def forward(self, queries: Shaped[Tensor, "*batch d"]) -> Match:
         """The index, similarity and margin of the best item for each query."""

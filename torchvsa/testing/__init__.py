@@ -15,5 +15,6 @@ unrelated hypervectors, 1/√d: use at least a few hundred dimensions.
 
 from torchvsa.testing.architectures import check_architecture
 from torchvsa.testing.encoders import check_encoder, check_value_encoder
+from torchvsa.testing.memories import check_memory
 
-__all__ = ["check_architecture", "check_encoder", "check_value_encoder"]
+__all__ = ["check_architecture", "check_encoder", "check_memory", "check_value_encoder"]
