@@ -15,8 +15,8 @@ from experiments.kit.run import check_all
 
 ROOT = Path(__file__).parents[2]
 NAMES = (
-    "algebra", "capacity", "composition", "corral", "damage", "generalisation", "interference", "observability",
-    "robustness", "scale", "sequence", "smooth", "wall_following",
+    "algebra", "capacity", "composition", "corral", "damage", "dimensions", "generalisation", "interference",
+    "memories", "observability", "resonator", "robustness", "scale", "sequence", "smooth", "wall_following",
 )  # fmt: skip
 
 
