@@ -13,13 +13,13 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import torch
 from matplotlib.figure import Figure
 
 from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, aggregated, grid, setting
 from experiments.kit.figures import legend_below, lines
+from experiments.tasks.seeds import generator_of
 from torchvsa import MAP, ClassicalHopfield, CleanUp, Hopfield, SparseDistributedMemory
 
 MEMORIES: dict[str, Callable[..., CleanUp]] = {
@@ -59,11 +59,10 @@ def cells(settings: Memories) -> list[Cell]:
 
 def measure(settings: Memories, cell: Cell) -> list[Row]:
     """For each share of noise: accuracy, similarity of the completed state with the right item, time, bytes."""
-    seed = np.random.SeedSequence([settings.seed, cell["items"], cell["repeat"]]).generate_state(1)[0]
-    generator = torch.Generator().manual_seed(int(seed))
+    generator = generator_of(settings.seed, cell["items"], cell["repeat"])
     items = MAP(settings.dim, dtype=torch.int8).random(cell["items"], generator=generator)
     memory = MEMORIES[cell["memory"]](items)
-    size = sum(tensor.numel() * tensor.element_size() for tensor in memory.state_dict().values())
+    size = sum(tensor.nbytes for tensor in memory.state_dict().values())
     rows = []
     for noise in settings.noise:
         index = torch.randint(len(items), (settings.queries,), generator=generator)

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cache, reduce
 from typing import Any
 
-import numpy as np
 import pandas as pd
 import torch
 from matplotlib.figure import Figure
@@ -21,6 +20,7 @@ from matplotlib.figure import Figure
 from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, grid, setting
 from experiments.kit.figures import BLACK, legend_below, lines
 from experiments.tasks.random_pairs import bracket, halve
+from experiments.tasks.seeds import generator_of
 from torchvsa import MAP, Resonator
 
 PUBLISHED = {
@@ -37,7 +37,7 @@ GUESS = {2: 0.3, 3: 0.05, 4: 0.018}
 
 
 @dataclass
-class Capacity(Settings):
+class Resonators(Settings):
     """The settings of this study."""
 
     dims: list[int] = setting([250, 500, 1000, 1500], "dimensions", low=16, distinct=True)
@@ -51,18 +51,17 @@ class Capacity(Settings):
     precision: float = setting(0.05, "largest gap above the size found, as a share of it", low=0, below=1)
 
 
-def cells(settings: Capacity) -> list[Cell]:
+def cells(settings: Resonators) -> list[Cell]:
     """A cell for each variant, number of factors and dimension; the longest first."""
     found = grid(variant=settings.variants, factors=settings.factors, dim=settings.dims)
     found = [cell for cell in found if cell["variant"] == "plain" or cell["dim"] <= settings.stochastic_to]
     return sorted(found, key=lambda cell: (-cell["factors"], -cell["dim"]))
 
 
-def share(settings: Capacity, cell: Cell, size: int) -> float:
+def share(settings: Resonators, cell: Cell, size: int) -> float:
     """The share of products that are factored; an upper bound of it once it is below the accuracy for certain."""
     factors, vsa = cell["factors"], MAP(cell["dim"], dtype=torch.int8)
-    seed = np.random.SeedSequence([settings.seed, factors, cell["dim"], size]).generate_state(1)[0]
-    generator = torch.Generator().manual_seed(int(seed))
+    generator = generator_of(settings.seed, factors, cell["dim"], size)
     wrong, each = 0, -(-settings.trials // settings.draws)
     for _ in range(settings.draws):
         books = vsa.random(factors, size, generator=generator).unbind(0)
@@ -75,7 +74,7 @@ def share(settings: Capacity, cell: Cell, size: int) -> float:
     return 1 - wrong / (each * settings.draws)
 
 
-def measure(settings: Capacity, cell: Cell) -> Row:
+def measure(settings: Resonators, cell: Cell) -> Row:
     """The largest codebooks that are factored, and the seconds of the search."""
     began = time.perf_counter()
 
@@ -88,7 +87,7 @@ def measure(settings: Capacity, cell: Cell) -> Row:
     return {"size": size, "seconds": time.perf_counter() - began}
 
 
-def summarise(settings: Capacity, records: pd.DataFrame) -> list[Row]:
+def summarise(settings: Resonators, records: pd.DataFrame) -> list[Row]:
     """A row for each cell, with the published size, and the gain of the stochastic variant in products."""
     table: list[Row] = []
     plain = {
@@ -154,7 +153,7 @@ QUICK = {"dims": [100, 200], "factors": [2, 3], "trials": 40, "draws": 2, "preci
 study = Study(
     name="resonator",
     about="How large a set of products does a resonator network factor?",
-    settings=Capacity,
+    settings=Resonators,
     cells=cells,
     measure=measure,
     summarise=summarise,

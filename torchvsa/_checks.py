@@ -23,6 +23,14 @@ def whole_number(value: Any, what: str) -> int:
         raise ValueError(f"{what}; got {value!r}") from None
 
 
+def positive_integer(name: str, value: Any) -> int:
+    """`value` as an int. Raises `ValueError` that names the option unless it is a whole number above 0."""
+    what = f"{name} is a positive integer"
+    if (number := whole_number(value, what)) < 1:
+        raise ValueError(f"{what}; got {value!r}")
+    return number
+
+
 _SEARCHED = 2**20
 """How far `nearest` searches in each direction; about a second."""
 

@@ -225,10 +225,12 @@ def _reading(sensor: Sensor, value: float) -> str:
 
 
 def _commands(actuators: Any, values: Any) -> str:
-    def one(actuator: Actuator, value: float) -> str:
-        return f"{actuator.name} = {value:.3g}" + (f" {actuator.unit}" if actuator.unit else "")
+    return _listed([command_text(*pair) for pair in zip(actuators, values, strict=True)])
 
-    return _listed([one(*pair) for pair in zip(actuators, values, strict=True)])
+
+def command_text(actuator: Actuator, value: float) -> str:
+    """A command with the name and the unit of its actuator."""
+    return f"{actuator.name} = {value:.3g}" + (f" {actuator.unit}" if actuator.unit else "")
 
 
 def _listed(parts: list[str], word: str = "and") -> str:

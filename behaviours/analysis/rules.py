@@ -10,6 +10,7 @@ import torch
 from jaxtyping import Bool, Float, Int64, Shaped
 from torch import Tensor
 
+from behaviours.analysis.explaining import command_text
 from behaviours.behaviour import Behaviour
 from behaviours.parts import Sensor
 from behaviours.schema import Schema
@@ -76,9 +77,7 @@ class Rules:
 
     def __str__(self) -> str:
         pairs = zip(self.schema.actuators, self.commands, strict=True)
-        given = " and ".join(
-            f"{actuator.name} = {value:.3g}{' ' * bool(actuator.unit)}{actuator.unit}" for actuator, value in pairs
-        )
+        given = " and ".join(command_text(*pair) for pair in pairs)
         if not self.rules:
             return f"No reading was found that gives {given}."
         return "\n".join(f"{given} if {self._text(rule)}." for rule in self.rules)
@@ -186,13 +185,13 @@ def _factored(
 ) -> tuple[Int64[Tensor, "k n"], Float[Tensor, "k"]]:
     """The cells that are present in the program for this result, and how strongly; the strongest first."""
     space, encoder, vsa = behaviour.space, behaviour.space.encoder, behaviour.space.vsa
-    suits = isinstance(encoder, Product) and isinstance(space.protect, Unprotected | FixedShift)
-    if not (suits and Resonator.supports(vsa) and int(used.sum()) > 1):
+    unmixed = isinstance(space.protect, Unprotected | FixedShift)
+    if not (isinstance(encoder, Product) and unmixed and Resonator.supports(vsa) and int(used.sum()) > 1):
         raise ValueError(
             "a resonator factors products of two or more sensors in MAP, BSC or FHRR, unprotected or behind a fixed "
             "shift; method='table' asks every cell instead"
         )
-    table: Any = encoder.table  # type: ignore[union-attr] (a product)
+    table: Any = encoder.table
     columns = used.nonzero()[:, 0].tolist()
     books = [table[column, : int(bins[column])] for column in columns]
     whole = space.protect.invert(vsa.unbind(_wide(behaviour.program.detach()), _dual(behaviour, label)))

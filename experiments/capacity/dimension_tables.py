@@ -11,7 +11,7 @@ from experiments.capacity import published
 from experiments.capacity.protocol import TASKS, UNBINDING, make
 from experiments.kit import Column, Outcome, Row, Table, grid
 from torchvsa import dim_needed, recall_probability
-from torchvsa.capacity import CLOSED_FORMS
+from torchvsa.capacity import CLOSED_FORMS, Kind
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -62,10 +62,9 @@ def line(name: str, dims: pd.Series) -> Row:
     return dict(zip(keys, (slope, start, AT * slope + start), strict=True))
 
 
-def recalled(name: str, task: str, items: int, dim: float, k: float) -> float:
+def recalled(name: str, task: Kind, items: int, dim: float, k: float) -> float:
     """The accuracy by the closed form."""
-    vsa: Any = make(name, int(dim))
-    return recall_probability(vsa, int(dim), int(k), items, kind=task)  # pyright: ignore[reportArgumentType] (a kind)
+    return recall_probability(make(name, int(dim)), int(dim), int(k), items, kind=task)
 
 
 def closed_dims(name: str, task: str, counts: Sequence[int], items: int, accuracy: float) -> dict[int, int]:

@@ -20,6 +20,7 @@ import torch
 from experiments.capacity import dimension_figures, dimension_tables, protocol
 from experiments.capacity.crossing import crossing, first_at, window
 from experiments.kit import Cell, Drawing, Row, Settings, Study, grid, setting
+from experiments.tasks.seeds import generator_of
 
 GRID = [m * m for m in (*range(2, 41), *range(42, 102, 2))]
 """Squares, since VTB allows no other numbers: all up to 1,600, then those of even numbers."""
@@ -71,7 +72,7 @@ def measure(settings: Dimensions, cell: Cell) -> list[Row]:
     name, task = cell["architecture"], cell["task"]
     if task == protocol.UNBINDING:
         return unbinding(settings, name)
-    k, shares, dims = cell["k"], {}, {}
+    k, dims = cell["k"], {}
 
     def accuracy(place: int) -> float:
         vsa = protocol.nearest_allowed(name, GRID[place])
@@ -98,9 +99,7 @@ def unbinding(settings: Dimensions, name: str) -> list[Row]:
 
 def generator(settings: Dimensions, *factors: object) -> torch.Generator:
     """Random numbers of their own for each combination of factors."""
-    numbers = [zlib.crc32(repr(factor).encode()) for factor in factors]
-    seed = np.random.SeedSequence([settings.seed, *numbers]).generate_state(1)[0]
-    return torch.Generator().manual_seed(int(seed))
+    return generator_of(settings.seed, *(zlib.crc32(repr(factor).encode()) for factor in factors))
 
 
 METHOD = """

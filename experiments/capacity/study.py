@@ -46,6 +46,7 @@ from experiments.tasks.random_pairs import (
     random_pairs,
     recalled,
 )
+from experiments.tasks.seeds import seed_of
 
 CLOSED_FORM = "closed_form"
 """The row that is computed and not measured."""
@@ -136,7 +137,7 @@ def measure(settings: Capacity, cell: Cell) -> list[Row]:
     first of them that is not held. Numbers after a recall under the setting `until` are left out.
     """
     learner, dim = cell["learner"], cell["dim"]
-    seed = int(np.random.SeedSequence([settings.seed, cell["repeat"]]).generate_state(1)[0])
+    seed = seed_of(settings.seed, cell["repeat"])
     rule, space = made(settings, learner, dim, seed)
     rows: list[Row] = []
 

@@ -16,6 +16,7 @@ from experiments.capacity.crossing import crossing, first_at, window
 from experiments.capacity.dimensions import GRID, PUBLISHED_GRID, cells, study
 from experiments.kit.run import check_all
 from torchvsa import dim_needed, recall_probability
+from torchvsa.capacity import Kind
 
 
 @pytest.mark.parametrize("k", [9, 27, 51])
@@ -66,12 +67,12 @@ def test_the_window_holds_both_sides_of_the_target(limit: int, start: int) -> No
 
 
 @pytest.mark.parametrize("task", protocol.TASKS)
-def test_the_tasks_are_what_a_plain_simulation_counts(task: str) -> None:
+def test_the_tasks_are_what_a_plain_simulation_counts(task: Kind) -> None:
     """Many dimensions find all, few hardly more than chance, and the closed form says what is between."""
     vsa = torchvsa.architecture("MAP-I", 300)
     draws = [torch.Generator().manual_seed(seed) for seed in range(30)]
     share = np.mean([protocol.TASKS[task](vsa, 15, 300, draw) for draw in draws])
-    assert share == pytest.approx(recall_probability("MAP-I", 300, 15, 300, kind=task), abs=0.03)  # pyright: ignore[reportArgumentType]
+    assert share == pytest.approx(recall_probability("MAP-I", 300, 15, 300, kind=task), abs=0.03)
     wide, narrow = torchvsa.architecture("MAP-I", 1500), torchvsa.architecture("MAP-I", 4)
     assert protocol.TASKS[task](wide, 15, 300, draws[0]) == 1
     assert protocol.TASKS[task](narrow, 15, 300, draws[0]) < 0.5

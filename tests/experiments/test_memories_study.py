@@ -29,7 +29,7 @@ def test_the_table_finds_every_item_and_crowded_networks_do_not() -> None:
 
 def test_the_capacity_found_holds_and_the_next_one_does_not() -> None:
     overrides = ("dims=[100]", "factors=[2]", "trials=40", "draws=2", "precision=0.0")
-    settings = cast(resonator.Capacity, composed(resonator.study, *overrides))
+    settings = cast(resonator.Resonators, composed(resonator.study, *overrides))
     cell = {"variant": "plain", "factors": 2, "dim": 100}
     size = resonator.measure(settings, cell)["size"]
     assert resonator.share(settings, cell, size) >= 0.99 > resonator.share(settings, cell, size + 1)

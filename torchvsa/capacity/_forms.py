@@ -28,14 +28,12 @@ class Stored:
         bound: Whether they are pairs, which are unbound before they are compared.
         raw: Whether the sum is left as it is, instead of being normalised once.
         atoms: How the elements of random hypervectors of MAP-C are distributed.
-        modulus: The number of angles of MCR.
     """
 
     count: int
     bound: bool = True
     raw: bool = False
     atoms: Atoms = "bipolar"
-    modulus: int = 16
 
 
 class Score(NamedTuple):
@@ -108,19 +106,7 @@ def _holographic(stored: Stored) -> Score:
 def _phasors(stored: Stored) -> Score:
     if stored.raw:
         return Score(math.sqrt(2 / stored.count), _sum(stored).spread)
-    return _from_harmonics(*_harmonics(stored.count))
-
-
-def _roots(stored: Stored) -> Score:
-    if stored.raw:
-        return _phasors(stored)
-    # Rounding an angle to one of r moves it by up to π/r.
-    step = math.pi / stored.modulus
     first, second = _harmonics(stored.count)
-    return _from_harmonics(first * math.sin(step) / step, second * math.sin(2 * step) / (2 * step))
-
-
-def _from_harmonics(first: float, second: float) -> Score:
     return Score(math.sqrt(2) * first, math.sqrt(max(1 + second - 2 * first**2, 0.0)))
 
 

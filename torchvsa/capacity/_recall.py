@@ -116,8 +116,7 @@ def _form(vsa: "VSA | str", atoms: Atoms | None, kind: Kind, raw: bool) -> Calla
     chosen = own if atoms is None else atoms
     if chosen not in ("bipolar", "uniform") or (chosen == "uniform" and name != "MAP-C"):
         raise ValueError(f"atoms are 'bipolar', or 'uniform' with MAP-C; got {chosen!r} with {name}")
-    modulus = getattr(vsa, "modulus", 16)
-    return lambda count: CLOSED_FORMS[name](Stored(count, kind == "pairs", raw, chosen, modulus))
+    return lambda count: CLOSED_FORMS[name](Stored(count, kind == "pairs", raw, chosen))
 
 
 def _probability(score: Score, dim: int, count: int, items: int, kind: Kind) -> float:

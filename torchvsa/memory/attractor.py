@@ -8,7 +8,6 @@ from jaxtyping import Float, Int8, Shaped
 from torch import Tensor
 
 from torchvsa._numerics import as_bipolar
-from torchvsa.errors import ShapeError
 from torchvsa.memory.cleanup import CleanUp, Match
 
 if TYPE_CHECKING:
@@ -28,10 +27,7 @@ class Attractor(CleanUp):
 
     def retrieve(self, queries: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The completed state of each query. Raises `ShapeError` unless queries end in d elements."""
-        if queries.dim() == 0 or queries.shape[-1] != self.items.shape[-1]:
-            raise ShapeError(
-                f"queries must end in d = {self.items.shape[-1]} elements; got shape {tuple(queries.shape)}"
-            )
+        self._check_queries(queries)
         rows = as_bipolar(queries.reshape(-1, queries.shape[-1]))
         states = self._completed(rows)
         states = states * (rows != 0).any(-1, keepdim=True)

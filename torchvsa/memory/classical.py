@@ -6,7 +6,7 @@ import torch
 from jaxtyping import Bool, Float, Float64, Int64, Shaped
 from torch import Tensor
 
-from torchvsa._checks import whole_number
+from torchvsa._checks import positive_integer
 from torchvsa.memory.attractor import BipolarAttractor, signs
 
 
@@ -31,7 +31,8 @@ class ClassicalHopfield(BipolarAttractor):
     energy never rises, so that the state comes to rest (Hopfield 1982). One by one costs d small steps in sequence.
 
     The outer product rule holds about .14 d items; more, or items that resemble each other, disturb each other. The
-    projection rule, W = Xᵀ (X Xᵀ)⁻¹ X without its diagonal, holds up to d linearly independent ones.
+    projection rule, W = Xᵀ (X Xᵀ)⁻¹ X without its diagonal, keeps up to d linearly independent ones as states of rest;
+    with many of them, noisy queries no longer lead there (see the study `memories`).
 
     Args:
         items: `[K, d]` of -1 / +1, or bits.
@@ -62,9 +63,7 @@ class ClassicalHopfield(BipolarAttractor):
                 f"got {rule!r} and {order!r}"
             )
         self.rule, self.order, self.seed = rule, order, seed
-        self.steps = whole_number(steps, "steps is a positive integer")
-        if self.steps < 1:
-            raise ValueError(f"steps is a positive integer; got {steps!r}")
+        self.steps = positive_integer("steps", steps)
         if rule == "projection":
             self._weights()
 

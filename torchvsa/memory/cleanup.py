@@ -74,15 +74,18 @@ class CleanUp(nn.Module):
 
     def forward(self, queries: Shaped[Tensor, "*batch d"]) -> Match:
         """The index, similarity and margin of the best item for each query."""
-        if queries.dim() == 0 or queries.shape[-1] != self.items.shape[-1]:
-            raise ShapeError(
-                f"queries must end in d = {self.items.shape[-1]} elements; got shape {tuple(queries.shape)}"
-            )
+        self._check_queries(queries)
         items, lengths = self._in_range()
         rows = queries.reshape(-1, queries.shape[-1])
         best_of = partial(_best, items=items, lengths=lengths)
         match = by_blocks(best_of, rows, row_bytes=8 * len(items), block_bytes=_PRODUCT_BYTES)
         return Match(*(answer.reshape(queries.shape[:-1]) for answer in match))
+
+    def _check_queries(self, queries: Tensor) -> None:
+        if queries.dim() == 0 or queries.shape[-1] != self.items.shape[-1]:
+            raise ShapeError(
+                f"queries must end in d = {self.items.shape[-1]} elements; got shape {tuple(queries.shape)}"
+            )
 
     def _in_range(self) -> tuple[Shaped[Tensor, "k d"], Float[Tensor, "k"]]:
         if self.items.dtype == torch.int8:

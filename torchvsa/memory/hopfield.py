@@ -4,7 +4,7 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor
 
-from torchvsa._checks import whole_number
+from torchvsa._checks import positive_integer
 from torchvsa._numerics import in_range, inner_products, safe_divide
 from torchvsa.memory.attractor import Attractor
 
@@ -32,9 +32,9 @@ class Hopfield(Attractor):
     def __init__(self, items: Shaped[Tensor, "k d"], beta: float | None = None, steps: int = 1) -> None:
         super().__init__(items)
         self.beta = float(items.shape[-1] ** 0.5 if beta is None else beta)
-        self.steps = whole_number(steps, "steps is a positive integer")
-        if not self.beta > 0 or self.steps < 1:
-            raise ValueError(f"beta is positive and steps at least 1; got beta={beta!r}, steps={steps!r}")
+        self.steps = positive_integer("steps", steps)
+        if not self.beta > 0:
+            raise ValueError(f"beta is positive; got {beta!r}")
 
     def _completed(self, rows: Shaped[Tensor, "batch d"]) -> Shaped[Tensor, "batch d"]:
         items, state = _unit(self.items), _unit(rows)

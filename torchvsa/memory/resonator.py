@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int64, Shaped
 from torch import Tensor, nn
 
 from torchvsa._blocks import by_blocks
-from torchvsa._checks import readable, whole_number
+from torchvsa._checks import positive_integer, readable
 from torchvsa._memory_limit import require_memory
 from torchvsa._numerics import cosines
 from torchvsa.errors import ShapeError
@@ -95,9 +95,7 @@ class Resonator(nn.Module):
                 raise ShapeError(f"codebook {number} must be [K, d] with K at least 1; got shape {tuple(book.shape)}")
             vsa.check_codes(book, f"codebook {number}")
         self.vsa = vsa
-        self.steps = whole_number(steps, "steps is a positive integer")
-        if self.steps < 1:
-            raise ValueError(f"steps is a positive integer; got {steps!r}")
+        self.steps = positive_integer("steps", steps)
         for name, value in (("noise", noise), ("threshold", threshold), ("accept", accept)):
             if value is not None and not (math.isfinite(value) and value >= 0):
                 raise ValueError(f"{name} is a number of 0 or more; got {value!r}")

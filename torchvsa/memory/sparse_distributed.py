@@ -7,9 +7,9 @@ from jaxtyping import Float, Shaped
 from torch import Tensor
 
 from torchvsa._blocks import by_blocks
-from torchvsa._checks import whole_number
+from torchvsa._checks import positive_integer, whole_number
 from torchvsa._memory_limit import require_memory
-from torchvsa._numerics import inner_products
+from torchvsa._numerics import as_bipolar, inner_products
 from torchvsa.memory.attractor import BipolarAttractor, signs
 
 
@@ -48,10 +48,8 @@ class SparseDistributedMemory(BipolarAttractor):
     ) -> None:
         super().__init__(items)
         count, dim = items.shape
-        self.locations = whole_number(locations, "locations is a positive integer")
-        self.steps = whole_number(steps, "steps is a positive integer")
-        if self.locations < 1 or self.steps < 1:
-            raise ValueError(f"locations and steps are positive integers; got {locations!r} and {steps!r}")
+        self.locations = positive_integer("locations", locations)
+        self.steps = positive_integer("steps", steps)
         share = (2 * self.locations * max(count, 2)) ** (-1 / 3)
         best = round(dim / 2 + NormalDist().inv_cdf(min(share, 0.5)) * dim**0.5 / 2)
         self.radius = best if radius is None else whole_number(radius, "radius is a whole number")
@@ -68,8 +66,7 @@ class SparseDistributedMemory(BipolarAttractor):
 
     def write(self, items: Shaped[Tensor, "k d"]) -> None:
         """Add each of `[K, d]` to the counters of the addresses near it; it has no index unless it is in `items`."""
-        x = signs(items if items.dtype != torch.bool else 1 - 2 * items.to(torch.int8))
-        for part in x.split(1024):  # whole numbers below 2^24, exact in float32
+        for part in signs(as_bipolar(items)).split(1024):  # whole numbers below 2^24, exact in float32
             self.counters += (self._active(part).T @ part).to(torch.int32)
 
     def _active(self, states: Float[Tensor, "batch d"]) -> Float[Tensor, "batch locations"]:

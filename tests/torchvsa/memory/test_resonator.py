@@ -33,6 +33,7 @@ def oracle(bound: np.ndarray, books: list[np.ndarray], steps: int) -> tuple[list
 
     states = [sign(book.sum(0)) for book in books]
     seen: list[list[list[int]]] = []
+    found: list[int] = []
     for step in range(1, steps + 1):
         similarities = []
         for place, book in enumerate(books):
@@ -47,7 +48,7 @@ def oracle(bound: np.ndarray, books: list[np.ndarray], steps: int) -> tuple[list
         marked = 2 ** int(np.log2(step - 1)) if step > 1 else 0
         if marked and seen[marked - 1] == seen[-1]:
             return found, step
-    return found, steps  # type: ignore[possibly-unbound] (at least one step)
+    return found, steps
 
 
 @pytest.mark.parametrize("sizes", [(5, 4), (12, 9, 7), (14, 14, 14)])
