@@ -125,6 +125,9 @@ def curves(outcome: Outcome) -> Figure:
         dims, sizes = zip(*PUBLISHED[factors].items(), strict=True)
         axes.plot(dims, [float(size) ** factors for size in sizes], "x", color=BLACK, label="Kent et al. 2020")
         axes.set(xscale="log", yscale="log", xlabel="dimensions d", ylabel="products", title=f"{factors} factors")
+        ticks = sorted({*own.dim, *dims})[::2]  # every other one, so that the labels have room
+        axes.set_xticks(ticks, [f"{dim:,}" for dim in ticks])
+        axes.minorticks_off()
     legend_below(figure, panels[0], 3)
     return figure
 
