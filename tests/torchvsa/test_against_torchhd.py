@@ -98,3 +98,45 @@ def test_similarity_of_bits_is_their_hamming_distance() -> None:
     vsa, x, peer = drawn("BSC", 2, 5)
     agreeing = plain(torchhd.hamming_similarity(peer[0], peer[1]))
     assert_close(vsa.similarity(x[0][:, None], x[1]), 2 * agreeing / DIM - 1)
+
+
+def test_vtb_multiplies_by_the_same_matrices() -> None:
+    vsa = torchvsa.VTB(900)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+    peer: Any = torchhd.ensure_vsa_tensor(x.clone(), "VTB")
+    assert_close(vsa.bind(x[0], x[1]), plain(torchhd.bind(peer[0], peer[1])))
+    assert_close(vsa.unbind(x[0], x[1]), plain(torchhd.bind(peer[0], torchhd.inverse(peer[1]))))
+    assert_close(vsa.identity(), plain(torchhd.identity(1, 900, "VTB")[0]))
+    assert_close(vsa.superpose(x), plain(torchhd.multibundle(peer)))
+    assert_close(vsa.similarity(x[0][:, None], x[1]), plain(torchhd.cosine_similarity(peer[0], peer[1])))
+
+
+def test_mcr_adds_the_same_numbers() -> None:
+    vsa = torchvsa.MCR(DIM)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+    peer: Any = vsa.numbers(x).long().as_subclass(torchhd.MCRTensor)
+    peer.block_size = 16
+    assert torch.equal(vsa.numbers(vsa.bind(x[0], x[1])).long(), plain(torchhd.bind(peer[0], peer[1])))
+    back = torchhd.bind(peer[0], torchhd.inverse(peer[1]))
+    assert torch.equal(vsa.numbers(vsa.unbind(x[0], x[1])).long(), plain(back))
+    # Of five summands few sums are halfway between two numbers, where rounding decides, or 0.
+    bundled, theirs = vsa.numbers(vsa.bundle(x)).long(), plain(torchhd.multibundle(peer))
+    assert (bundled == theirs).double().mean() > 0.99
+
+
+def test_sparse_block_codes_add_the_same_places() -> None:
+    vsa = torchvsa.BSDCSEG(900)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+
+    def places(codes: Tensor) -> Tensor:
+        return codes.unflatten(-1, (vsa.places, vsa.blocks)).argmax(-2)
+
+    peer: Any = places(x).as_subclass(torchhd.BSBCTensor)
+    peer.block_size = vsa.places
+    assert torch.equal(places(vsa.bind(x[0], x[1])), plain(torchhd.bind(peer[0], peer[1])))
+    back = torchhd.bind(peer[0], torchhd.inverse(peer[1]))
+    assert torch.equal(places(vsa.unbind(x[0], x[1])), plain(back))
+    assert torch.equal(places(vsa.identity()), plain(torchhd.identity(1, 30, "BSBC", block_size=30)[0]))
+    # Codes of the same blocks: torch-hd counts equal places, a cosine divides them by the number of blocks.
+    equal = (places(x[0])[:, None] == places(x[1])).double().sum(-1)
+    assert_close(vsa.similarity(x[0][:, None], x[1]).double(), equal / vsa.blocks)
