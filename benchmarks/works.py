@@ -14,6 +14,7 @@ from benchmarks import (
     random_vectors,
     recall,
     rollouts,
+    sparse,
 )
 from benchmarks.harness import time_case
 from benchmarks.report import wide_console
@@ -25,6 +26,7 @@ WORKS = {
     "random": random_vectors,
     "learning": learning,
     "recall": recall,
+    "sparse": sparse,
     "rollouts": rollouts,
     "imports": imports,
 }

@@ -14,6 +14,7 @@ from torch import Tensor
 
 from torchvsa._blocks import by_blocks
 from torchvsa._checks import whole_number
+from torchvsa._kernels.index_digits import digit_count, index_digits
 from torchvsa._memory_limit import require_memory
 from torchvsa._numerics import as_bipolar, inner_products, is_integer
 from torchvsa.architectures import VSA
@@ -128,7 +129,7 @@ class SelfShift(Protection):
         if width not in ("mean", "sum"):
             raise ValueError(f"the width of a self-derived shift is 'mean' or 'sum'; got {width!r}")
         self.width_rule = width
-        count = _digit_count(vsa.dim)
+        count = digit_count(vsa.dim)
         # `derive` computes in int64 and holds three such tensors.
         require_memory(8 * (3 * count + 2) * vsa.dim, f"a self-derived shift of d = {vsa.dim}", "take fewer dimensions")
         if h is not None and h.shape != (vsa.dim,):
@@ -144,12 +145,8 @@ class SelfShift(Protection):
 
     def derive(self) -> None:
         """Compute the digits of all indices, from which `width` sums; they depend only on d."""
-        # Digits in base 128 fit int8, whose products sum exactly on every device.
-        dim, device = self.vsa.dim, self.h.device
-        values = 128 ** torch.arange(_digit_count(dim), device=device)
-        digits = torch.arange(dim, device=device) // values[:, None] % 128
-        ones = torch.ones(1, dim, dtype=torch.int64, device=device)
-        self.index_digits, self.digit_values = torch.cat([ones, digits]).to(torch.int8), values
+        digits, self.digit_values = index_digits(self.vsa.dim, self.h.device)
+        self.index_digits = torch.cat([torch.ones_like(digits[:1]), digits])
 
     def own_layout(self) -> Layout:
         """`h` `[d]`."""
@@ -206,14 +203,6 @@ class SelfShift(Protection):
     def config(self) -> dict[str, Any]:
         """The name and the rule of the width; `h` is a tensor."""
         return {"name": self.name, "width": self.width_rule}
-
-
-def _digit_count(dim: int) -> int:
-    """The number of digits of the largest index in base 128."""
-    count = 1
-    while 128**count < dim:
-        count += 1
-    return count
 
 
 def _floats(x: Tensor) -> Tensor:

@@ -53,7 +53,7 @@ def test_the_command_measures_every_work(
     works = {row["work"].split(",")[0] for row in compared}
     assert works == {
         "record encoding", "clean-up", "protect", "random hypervectors", "Algorithm 1", "Algorithm 2", "robot step",
-        "import beyond torch",
+        "import beyond torch", "sparse codes",
     }  # fmt: skip
     for row in compared:
         assert set(row) >= COLUMNS

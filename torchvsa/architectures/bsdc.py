@@ -4,7 +4,8 @@ import torch
 from jaxtyping import Float, Int64, Shaped
 from torch import Tensor
 
-from torchvsa._numerics import norms
+from torchvsa._kernels.index_digits import index_digits
+from torchvsa._numerics import inner_products, norms
 from torchvsa.architectures._sparse import SparseBinary
 
 
@@ -48,9 +49,9 @@ class BSDC(SparseBinary):
     def width(self, key: Shaped[Tensor, "*batch d"]) -> Int64[Tensor, "*batch"]:
         """The sum of the indices of the elements above 0, modulo d: exact, whatever the type and the device."""
         self.check(key, "key")
-        # Sums of indices below 2^26 are exact in float64, up to d = 2^26.
-        indices = torch.arange(self.dim, dtype=torch.float64, device=key.device)
-        return ((key > 0).to(torch.float64) @ indices).to(torch.int64) % self.dim
+        digits, values = index_digits(self.dim, key.device)
+        sums = inner_products((key > 0).to(torch.int8), digits).to(torch.int64)
+        return (sums * values).sum(-1) % self.dim
 
     def _bind(self, a: Tensor, b: Tensor) -> Tensor:
         return self.permute(a, self.width(b))

@@ -66,13 +66,36 @@ class BSDCSEG(SparseBinary):
         return segments.roll(-1, -2).flip(-2).flatten(-2)
 
     def _bind(self, a: Tensor, b: Tensor) -> Tensor:
-        return self._convolved(a, b, conjugate=False)
+        keys = self._places(b)
+        if keys is None and (keys := self._places(a)) is not None:
+            a = b  # bind commutes
+        return self._convolved(a, b, conjugate=False) if keys is None else self._rotated(a, keys)
 
     def _unbind(self, bound: Tensor, key: Tensor) -> Tensor:
-        return self._convolved(bound, key, conjugate=True)
+        keys = self._places(key)
+        return self._convolved(bound, key, conjugate=True) if keys is None else self._rotated(bound, -keys)
+
+    def _places(self, x: Tensor) -> Int64[Tensor, "*batch segments"] | None:
+        """The place of each segment, if every segment of all hypervectors has a single one."""
+        if x.dtype != self.dtype or not readable(x) or x.numel() == 0 or x.min() < 0:
+            return None
+        places = torch.arange(self.places, dtype=torch.float32)
+        # Sums of whole numbers below 2^24 are exact.
+        sums = torch.stack([torch.ones_like(places), places]) @ x.to(torch.float32).unflatten(-1, (-1, self.blocks))
+        return sums[..., 1, :].to(torch.int64) if (sums[..., 0, :] == 1).all() else None
+
+    def _rotated(self, x: Tensor, places: Tensor) -> Tensor:
+        """Each segment of `x` rotated by its place: the convolution with a single one."""
+        if (own := self._places(x)) is not None:
+            there = (own + places) % self.places
+            return self.from_positions(there * self.blocks + torch.arange(self.blocks))
+        at = torch.arange(self.places, device=x.device)[:, None] - places.unsqueeze(-2)
+        index = (at.remainder(self.places) * self.blocks + torch.arange(self.blocks, device=x.device)).flatten(-2)
+        shape = torch.broadcast_shapes(x.shape, index.shape)
+        return x.expand(shape).gather(-1, index.expand(shape))
 
     def _convolved(self, a: Tensor, b: Tensor, conjugate: bool) -> Tensor:
-        """The circular convolution of each segment, exact for integers: rounded from float64."""
+        """The circular convolution of each segment, exact for integers: rounded from floats."""
         if a.numel() == 0 or b.numel() == 0:
             # The Fourier transform refuses an empty batch; the product has the right shape and type.
             return a * b
@@ -84,13 +107,12 @@ class BSDCSEG(SparseBinary):
         ]
         product = spectra[0] * (spectra[1].conj() if conjugate else spectra[1])
         result = torch.fft.irfft(product, n=self.places, dim=-2).flatten(-2)
+        dtype = torch.promote_types(a.dtype, b.dtype)
         if not whole:
-            return result.to(torch.promote_types(a.dtype, b.dtype))
+            return result.to(dtype)
         # A sum of products of bits is at most the number of places.
-        dtype = torch.promote_types(
-            torch.promote_types(a.dtype, b.dtype), torch.int8 if self.places < 128 else torch.int32
-        )
-        return narrowed(result.round().to(torch.int64), dtype, "the product")
+        wide = torch.promote_types(dtype, torch.int8 if self.places < 128 else torch.int32)
+        return narrowed(result.round().to(torch.int64), wide, "the product")
 
 
 _EXACT = 2**46
