@@ -30,8 +30,8 @@ class VSA(Derived):
 
     A new architecture implements `random`, `identity`, `_bind`, `_unbind` (not needed if `_bind` undoes itself) and
     `normalize`. It sets `name` and every attribute below that differs, overrides `allows_dim` if not every `dim` works
-    and `inverse` if there is one, and is registered in `torchvsa.ARCHITECTURES`. `bind` and `unbind` check shapes and then call `_bind` and `_unbind`;
-    an architecture that needs other checks overrides the public methods instead.
+    and `inverse` if there is one, and is registered in `torchvsa.ARCHITECTURES`. `bind` and `unbind` check shapes and
+    then call `_bind` and `_unbind`; an architecture that needs other checks overrides the public methods instead.
     """
 
     name: str
