@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from functools import reduce
 from itertools import repeat
 from math import isfinite
-from typing import Any
+from typing import Any, ClassVar
 
 import torch
 from jaxtyping import Int64, Shaped
@@ -26,6 +26,7 @@ class Derived(ABC):
     name: str
     dim: int
     self_inverse: bool
+    negatable: ClassVar[bool]
 
     @property
     @abstractmethod
@@ -112,6 +113,13 @@ class Derived(ABC):
                 f"a record has a value for each role; got {roles.shape[-2]} roles, {values.shape[-2]} values"
             )
         return self._joined(self.bind(values, roles), raw)
+
+    def negative(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """The hypervector whose similarity to `x` is -1. Raises `ValueError` unless the architecture is `negatable`."""
+        if not self.negatable:
+            raise ValueError(f"{self.name} has no negative hypervectors")
+        self.check(x, "x")
+        return ~x if x.dtype == torch.bool else -x
 
     def inverse(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The hypervector with `bind(a, inverse(x)) = unbind(a, x)`.

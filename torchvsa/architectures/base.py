@@ -144,13 +144,6 @@ class VSA(Derived):
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Turn a raw accumulator into a hypervector of this architecture."""
 
-    def negative(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """The hypervector whose similarity to `x` is -1. Raises `ValueError` unless the architecture is `negatable`."""
-        if not self.negatable:
-            raise ValueError(f"{self.name} has no negative hypervectors")
-        self.check(x, "x")
-        return ~x if x.dtype == torch.bool else -x
-
     @property
     def frequencies(self) -> int | None:
         """The number of angles that `from_angles` takes; None for an architecture without a spectrum."""
