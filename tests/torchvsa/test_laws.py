@@ -81,3 +81,13 @@ def test_rows_drawn_one_by_one_are_the_rows_drawn_at_once(name: str, dim: int) -
     at_once = vsa.random(2, 3, generator=together)
     one_by_one = torch.stack([vsa.random(generator=single) for _ in range(6)])
     assert torch.equal(at_once.reshape(6, dim), one_by_one)
+
+
+def test_ngrams_tell_the_order_of_their_members(vsa: VSA, draw: Draw, chance: float) -> None:
+    a, b, c = draw(3)
+    orders = torch.stack([vsa.ngrams(xs) for xs in ([a, b, c], [b, a, c], [a, c, b], [c, b, a])])
+    if vsa.name == "HRR":
+        # A rotation commutes with the convolution, as the docstring says.
+        assert_close(vsa.similarity(orders[0], orders), torch.ones(4))
+    else:
+        assert vsa.similarity(orders[0], orders[1:]).abs().max() < chance

@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from functools import reduce
 from itertools import repeat
 from math import isfinite
+from numbers import Real
 from typing import Any, ClassVar
 
 import torch
@@ -135,7 +136,7 @@ class Derived(ABC):
         self.check(x, "x")
         return x
 
-    def power(self, x: Shaped[Tensor, "*batch d"], n: float) -> Shaped[Tensor, "*batch d"]:
+    def power(self, x: Shaped[Tensor, "*batch d"], n: int | float) -> Shaped[Tensor, "*batch d"]:
         """`x` bound to itself `n - 1` times: `power(x, 3)` is `bind(bind(x, x), x)`, `power(x, 0)` the identity.
 
         `power(x, -n)` is `power(inverse(x), n)`. Where binding does not commute, `x` is the key on the right, and
@@ -152,11 +153,11 @@ class Derived(ABC):
         Source: Plate 1995, "Holographic reduced representations", on convolution powers; Plate 1992 for fractions.
         """
         self.check(x, "x")
-        if isinstance(n, bool) or not isinstance(n, int | float) or not isfinite(n):
+        if isinstance(n, bool) or not isinstance(n, Real) or not isfinite(n):
             raise ValueError(f"the exponent is one real number; got {n!r}")
         if self.frequencies is None and n != int(n):
             raise ValueError(f"{self.name} has no spectrum; fractional powers need FHRR or HRR; got n = {n}")
-        return self._power(x, n)
+        return self._power(x, float(n))
 
     def _power(self, x: Tensor, n: float) -> Tensor:
         if n == 0:
