@@ -15,7 +15,7 @@ from behaviours.options import as_int
 from behaviours.schema import Schema
 from behaviours.storage import Layout, check_layout, error_context
 from torchvsa import MAP, VSA, Part, Protection, Unprotected
-from torchvsa.encoders import Balanced, Encoder, Sum, ValueEncoder
+from torchvsa.encoders import Balanced, Encoder, Lookup, Sum, ValueEncoder
 from torchvsa.encoders.base import UNOBSERVED
 
 
@@ -33,7 +33,8 @@ class Space(nn.Module):
         vsa: The architecture of the default encoder; by default `MAP(4000, dtype=torch.int8)`. Give `encoder` or `vsa`.
         protection: By default none.
         seed: A whole number.
-        command_codes: Encodes the levels of the actuators; by default `Balanced` codes.
+        command_codes: Encodes the levels of the actuators; by default `Balanced` codes, or `Lookup` codes if the
+            architecture has no negatives.
         mirror: The names of sensors that swap in a mirror image of the robot, and the names of actuators that swap, as
             in `{"light_left": "light_right", "left_motor": "right_motor"}`. Behaviours then have a mirror image, see
             `Behaviour.mirror`. The encoder is `Mirrored`, by default with `Level` codes of 32 bins.
@@ -70,7 +71,7 @@ class Space(nn.Module):
         check_value_bins(schema, encoder)
         self.vsa = encoder.vsa
         most = max(actuator.levels for actuator in actuators)
-        result_encoder = Sum(command_codes or Balanced(self.vsa, most), sensors=len(actuators))
+        result_encoder = Sum(command_codes or _command_codes(self.vsa, most), sensors=len(actuators))
         if result_encoder.bins != most:
             raise ValueError(f"the codes of commands are for {result_encoder.bins} levels; the schema has {most}")
         protection = protection or Unprotected(self.vsa)
@@ -230,6 +231,10 @@ def conditions_of(spaces: Sequence[Space], cells: Shaped[Tensor, "batch w"]) -> 
         everything = len(space.sensors) == len(space.schema.sensors)
         encoded[space.sensors] = condition if everything else condition.masked_fill((seen < 0).all(-1, keepdim=True), 0)
     return [encoded[space.sensors] for space in spaces]
+
+
+def _command_codes(vsa: VSA, levels: int) -> ValueEncoder:
+    return Balanced(vsa, levels) if vsa.negatable else Lookup(vsa, levels)
 
 
 def _layout(parts: Mapping[str, Part]) -> Layout:

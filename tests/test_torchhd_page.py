@@ -14,8 +14,6 @@ from packages import ROOT
 from torch import Tensor
 from torch.testing import assert_close
 
-import torchvsa
-
 PAGE = (ROOT / "docs" / "torch-hd.md").read_text()
 NAMES, EXAMPLE = re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL)
 SECTIONS = dict(re.findall(r"^## [A-Z]\w+: `([\w.]+)`$(.*?)(?=^## )", PAGE, re.MULTILINE | re.DOTALL))
@@ -76,8 +74,6 @@ def rows(module: str) -> Iterator[Row]:
             warnings.simplefilter("ignore", DeprecationWarning)  # `hard_quantize` is deprecated
             value = evaluated(code, theirs)
         named = named_in(code, theirs)
-        if mine and mine.startswith("torchvsa.") and not hasattr(torchvsa, mine[9:].partition("(")[0]):
-            mine = "..."
         yield Row(code, value, evaluated(mine, ours) if mine else None, note.strip(), named)
 
 

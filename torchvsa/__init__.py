@@ -1,7 +1,21 @@
 """Vector Symbolic Architectures in PyTorch: batched operations on plain tensors, exact for integers."""
 
 from torchvsa import encoders
-from torchvsa.architectures import ARCHITECTURES, BSC, FHRR, HRR, MAP, VSA, architecture
+from torchvsa.architectures import (
+    ARCHITECTURES,
+    BSC,
+    BSDC,
+    BSDCSEG,
+    FHRR,
+    HRR,
+    MAP,
+    MBAT,
+    MCR,
+    VSA,
+    VTB,
+    architecture,
+    architecture_near,
+)
 from torchvsa.capacity import dim_needed, pairs_held, recall_probability
 from torchvsa.errors import ShapeError
 from torchvsa.memory import (
@@ -23,12 +37,17 @@ __version__ = "0.4.0"
 __all__ = [
     "ARCHITECTURES",
     "BSC",
+    "BSDC",
+    "BSDCSEG",
     "FHRR",
     "HRR",
     "MAP",
+    "MBAT",
+    "MCR",
     "MEMORIES",
     "PROTECTIONS",
     "VSA",
+    "VTB",
     "ClassicalHopfield",
     "CleanUp",
     "Factors",
@@ -44,6 +63,7 @@ __all__ = [
     "SparseDistributedMemory",
     "Unprotected",
     "architecture",
+    "architecture_near",
     "dim_needed",
     "encoders",
     "pairs_held",

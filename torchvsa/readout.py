@@ -63,7 +63,7 @@ class Readout(nn.Module):
             lengths = norms(items)
             lengths = torch.where(lengths == 0, 1.0, lengths)  # products with zero vectors are 0 already
         self.vsa = vsa
-        folded = vsa.fold(_wide(programs, items)[..., None, :], items) if vsa.bilinear else None
+        folded = vsa.fold(_wide(programs, items, vsa.elementwise)[..., None, :], items) if vsa.bilinear else None
         buffers = {"programs": programs, "units": units, "items": items, "lengths": lengths, "folded": folded}
         for name, tensor in buffers.items():
             self.register_buffer(name, tensor, persistent=False)
@@ -105,7 +105,10 @@ class Readout(nn.Module):
         return self.vsa.unbind(self.programs, conditions if self.programs.dim() == 1 else conditions[:, None])
 
 
-def _wide(programs: Tensor, items: Tensor) -> Tensor:
-    """Programs in a type that holds their products with the items, which exceed int32 if both are int32 sums."""
-    sums = is_integer(programs) and is_integer(items) and programs.element_size() == items.element_size() == 4
-    return programs.to(torch.int64) if sums else programs
+def _wide(programs: Tensor, items: Tensor, elementwise: bool) -> Tensor:
+    """Programs in a type that holds their products with the items.
+
+    They can exceed int32 if both are int32 sums, or if an element of a product is a sum of several products.
+    """
+    sums = is_integer(programs) and is_integer(items) and programs.element_size() == 4
+    return programs.to(torch.int64) if sums and (items.element_size() == 4 or not elementwise) else programs

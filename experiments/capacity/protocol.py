@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import torch
 
-from torchvsa import ARCHITECTURES, VSA, CleanUp, architecture
+from torchvsa import ARCHITECTURES, VSA, CleanUp, architecture, architecture_near
 
 UNIFORM = "MAP-C uniform"
 """MAP-C with atoms that are uniform in [-1, 1], which is the MAP-C of the published measurements."""
@@ -22,13 +22,7 @@ def make(name: str, dim: int) -> VSA:
 
 def nearest_allowed(name: str, dim: int) -> VSA:
     """The architecture with the number of dimensions nearest to `dim` that it allows; of two the smaller one."""
-    for apart in range(dim):
-        for near in (dim - apart, dim + apart):
-            try:
-                return make(name, near)
-            except ValueError:
-                continue
-    raise ValueError(f"{name} allows no number of dimensions from 1 to {2 * dim - 1}")
+    return architecture_near("MAP-C", dim, atoms="uniform") if name == UNIFORM else architecture_near(name, dim)
 
 
 def found_in_bundle(vsa: VSA, k: int, items: int, generator: torch.Generator) -> float:

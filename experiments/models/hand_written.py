@@ -66,30 +66,40 @@ def space(vsa: VSA, seed: int) -> Space:
     return Space(schema, Sum(Lookup(vsa, bins=2), len(sensors)), seed=seed)
 
 
+def written(vsa: VSA) -> tuple[tuple[int, ...], ...]:
+    """The conditions that are written down: five rules, or all eight cases if keys that differ a little are unrelated.
+
+    A rule speaks in a case because their conditions are similar. Where binding is not bilinear, as with shifts, only
+    equal conditions find each other.
+    """
+    return RULES if vsa.bilinear else CASES
+
+
 def behaviour(vsa: VSA, seed: int) -> Behaviour:
-    """Five weighted rules, bundled raw into one program.
+    """Five weighted rules (see `written`), bundled raw into one program.
 
     Raises `ValueError` for codebooks with which no weights make the program right in all 8 cases.
     """
     codes = space(vsa, seed)
-    conditions, cases = codes.encode(torch.tensor(RULES)), codes.encode(torch.tensor(CASES))
+    rules = written(vsa)
+    conditions, cases = codes.encode(torch.tensor(rules)), codes.encode(torch.tensor(CASES))
     results, result_of = distinct_rows(
         codes.schema.command_levels(TEACHER_COMMANDS)
     )  # avoid and cruise repeat a command
     right = result_of[[_fires(case) for case in CASES]]
     items = codes.items(results)
-    pairs = vsa.bind(items[result_of], conditions)
+    pairs = vsa.bind(items[result_of if vsa.bilinear else right], conditions)
     # Scores are linear in the program, so those of the bundle are the weighted sum of those of the single pairs.
     weights = _weights(vsa.readout(pairs, items)(cases), right)
-    report = LearningReport("hand_written", samples=len(RULES), new=len(RULES))
-    written = Behaviour(codes, vsa.superpose(pairs, weights=weights), vsa.superpose(conditions), results, report)
-    answers = codes.schema.command_levels(written.query(cases).commands)
+    report = LearningReport("hand_written", samples=len(rules), new=len(rules))
+    made = Behaviour(codes, vsa.superpose(pairs, weights=weights), vsa.superpose(conditions), results, report)
+    answers = codes.schema.command_levels(made.query(cases).commands)
     if (answers != results[right]).any():
         raise ValueError(
-            f"no weights of the five rules make a bundle that is right in all 8 cases with {vsa} and seed {seed}; take "
-            "more dimensions (vsa.dim), or leave out hand_written"
+            f"no weights of the {len(rules)} rules make a bundle that is right in all 8 cases with {vsa} and seed "
+            f"{seed}; take more dimensions (vsa.dim), or leave out hand_written"
         )
-    return written
+    return made
 
 
 def _fires(case: tuple[int, ...]) -> int:
@@ -97,7 +107,7 @@ def _fires(case: tuple[int, ...]) -> int:
     return next(i for i, rule in enumerate(RULES) if all(b in (a, EITHER) for a, b in zip(case, rule, strict=True)))
 
 
-def _weights(scores: Float64[Tensor, "8 5 3"], right: Int64[Tensor, "8"]) -> Int64[Tensor, "5"]:
+def _weights(scores: Float64[Tensor, "8 rules 3"], right: Int64[Tensor, "8"]) -> Int64[Tensor, "rules"]:
     """Weights with which the `right` result scores highest in each case, given the scores of each rule by itself.
 
     All are 0 if there are none.
@@ -112,6 +122,8 @@ def _weights(scores: Float64[Tensor, "8 5 3"], right: Int64[Tensor, "8"]) -> Int
     )
     best, by_hand = largest_margin(leads), np.array(BY_HAND)
     if not best.any():
-        return torch.zeros(len(RULES), dtype=torch.int64)
+        return torch.zeros(leads.shape[1], dtype=torch.int64)
+    if len(best) != len(by_hand):
+        return torch.from_numpy(whole(leads, best))
     will_do = margin(leads, by_hand) >= ENOUGH * margin(leads, best)
     return torch.from_numpy(by_hand if will_do else whole(leads, best))

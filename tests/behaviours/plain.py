@@ -50,7 +50,7 @@ def query(behaviour: Behaviour, reading: list[float]) -> Answer:
     space, vsa = behaviour.space, behaviour.space.vsa
     bins = space.cells([reading])[0].tolist()
     record: Any = space.encoder
-    bound = [vsa.bind(record.roles[i], record.codes[b]) for i, b in enumerate(bins) if b >= 0]
+    bound = [vsa.bind(record.codes[b], record.roles[i]) for i, b in enumerate(bins) if b >= 0]
     protected = space.protect(vsa.bundle(torch.stack(bound)))  # 1
     noisy = vsa.unbind(behaviour.program, protected)  # 2
     stored = space.items(behaviour.results)

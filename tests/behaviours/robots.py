@@ -20,6 +20,19 @@ SCHEMA = Schema(
 """3 sensors of 20 values and 9 results from 2 actuators of 3 values: the robot of DESIGN's numbers."""
 
 
+def _kinds() -> list[str]:
+    made = [torchvsa.architecture_near(name, 64) for name in torchvsa.ARCHITECTURES]
+    capabilities = {
+        (v.dtype, v.elementwise, v.commutative, v.bilinear, v.negatable, v.breaks_ties, v.clips): v.name
+        for v in reversed(made)
+    }
+    return [v.name for v in made if v.name in capabilities.values()]
+
+
+KINDS = _kinds()
+"""The first architecture of each kind: behaviours ask for capabilities, never for a name."""
+
+
 def space(
     dim: int = 1024,
     vsa: str | VSA = "MAP-C",
@@ -35,7 +48,7 @@ def space(
     """
     if isinstance(vsa, str):
         exact = "int8" if vsa.startswith("MAP") else None
-        vsa = torchvsa.architecture(vsa, dim, dtype or exact)
+        vsa = torchvsa.architecture_near(vsa, dim, dtype or exact)
     return Space(
         SCHEMA,
         encoder(vsa, **options),

@@ -10,7 +10,7 @@ import pytest
 import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robots import random_pairs, same_bits, space
+from robots import KINDS, random_pairs, same_bits, space
 from torch.testing import assert_close
 
 from behaviours import (
@@ -23,7 +23,6 @@ from behaviours import (
     LearningReport,
     OneShot,
 )
-from torchvsa import ARCHITECTURES
 from torchvsa._numerics import as_bipolar
 
 NAMES = ["seek", "avoid", "flee"]
@@ -46,9 +45,9 @@ def same(a: Behaviour, b: Behaviour) -> bool:
     return all(x.dtype == y.dtype and torch.equal(x, y) for x, y in tensors) and a.report == b.report
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_programs_and_known_conditions_are_weighted_sums(vsa: str) -> None:
-    bank = learned(vsa, 200)
+    bank = learned(vsa, 400)
     both = bank["seek"] + 2 * bank["avoid"] - bank["flee"] / 4
     for name in ("program", "known"):
         seek, avoid, flee = (as_bipolar(getattr(bank[part], name)) for part in NAMES)
@@ -146,9 +145,9 @@ def test_a_report_says_what_a_sum_is_made_of() -> None:
     assert (unnamed + bank["seek"]).report.terms == ("one_shot", "seek")
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_a_sum_is_a_behaviour_like_any_other(vsa: str, tmp_path: Path) -> None:
-    bank = learned(vsa, 200)
+    bank = learned(vsa, 400)
     made = bank["seek"] + 2 * bank["avoid"]
     recall = made(READINGS)
     assert recall.commands.shape == (13, 2)

@@ -4,17 +4,16 @@ from copy import deepcopy
 
 import pytest
 import torch
-from robots import correct, random_pairs, same_bits, space
+from robots import KINDS, correct, random_pairs, same_bits, space
 
 from behaviours import Behaviour, ErrorDriven, OneShot, Recall
-from torchvsa import ARCHITECTURES
 
 
 def same(a: Recall, b: Recall) -> bool:
     return all(same_bits(x, y) for x, y in zip(a[:4], b[:4], strict=True) if x is not None and y is not None)
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_a_loaded_state_answers_at_once(vsa: str) -> None:
     """Asked before loading as well, so that nothing kept from then may answer."""
     shown, others = random_pairs(12), random_pairs(12, seed=8)
@@ -77,7 +76,7 @@ def test_clipped_is_a_clipped_copy() -> None:
     assert clipped.results.tolist() == behaviour.results.tolist()
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_a_clipped_program_still_answers(vsa: str) -> None:
     # Three pairs keep much of their similarity even as bits.
     shown = random_pairs(3)

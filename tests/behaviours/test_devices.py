@@ -10,7 +10,7 @@ import pytest
 import torch
 from devices import other
 from on_devices import brought, close, same, seeded
-from robots import random_pairs, space
+from robots import KINDS, random_pairs, space
 from torch import nn
 
 import torchvsa
@@ -28,7 +28,6 @@ from behaviours import (
     Space,
 )
 from behaviours.edges import quantile_edges
-from torchvsa import ARCHITECTURES
 from torchvsa.encoders import History
 from torchvsa.encoders.history import windows
 
@@ -55,13 +54,13 @@ OPTIONS: list[Rule] = [
 
 # Each rule in half of the architectures, whose own lines `test_algebra_on_devices` checks; each option, another line of
 # the rule alone, in one.
-LEARNED = [(rule, name) for turn, rule in enumerate(PLAIN) for name in list(ARCHITECTURES)[turn % 2 :: 2]] + [
-    (rule, list(ARCHITECTURES)[turn]) for turn, rule in enumerate(OPTIONS)
+LEARNED = [(rule, name) for turn, rule in enumerate(PLAIN) for name in KINDS[turn % 2 :: 2]] + [
+    (rule, KINDS[turn]) for turn, rule in enumerate(OPTIONS)
 ]
 
 
 @pytest.mark.parametrize(
-    ("rule", "name"), [(r, name) for r, name in LEARNED if r.supports(torchvsa.architecture(name, 8))], ids=str
+    ("rule", "name"), [(r, name) for r, name in LEARNED if r.supports(torchvsa.architecture_near(name, 8))], ids=str
 )
 def test_learning_and_recall(there: Callable[..., None], rule: Rule, name: str) -> None:
     there(check_learning, rule, name)

@@ -5,12 +5,11 @@ from typing import Any
 import pytest
 import torch
 from if_else import Rules, learned, readings, space, variants
-from robots import random_pairs
+from robots import KINDS, random_pairs
 from robots import space as other_space
 from scipy.stats import spearmanr
 
 from behaviours import BehaviourBank, Demonstrations, OneShot, distance, distances
-from torchvsa import ARCHITECTURES
 
 
 @pytest.mark.slow
@@ -25,7 +24,7 @@ def test_distance_follows_disagreement() -> None:
     assert ranked.statistic >= 0.90
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_distances_are_those_of_each_two(vsa: str) -> None:
     bank = BehaviourBank(other_space(200, vsa))
     for number in range(3):

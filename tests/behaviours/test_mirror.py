@@ -32,7 +32,7 @@ from behaviours.storage import load_tensors, save_tensors
 from torchvsa.encoders import FractionalPower, Level, Lookup, Mirrored, Product, ValueEncoder
 
 SWAP = {"left": "right", "left_motor": "right_motor"}
-ELEMENTWISE = [name for name in torchvsa.ARCHITECTURES if torchvsa.architecture(name, 64).elementwise]
+ELEMENTWISE = [name for name in torchvsa.ARCHITECTURES if torchvsa.architecture_near(name, 64).elementwise]
 READINGS = torch.rand(40, 3, generator=torch.Generator().manual_seed(1), dtype=torch.float64) * 20
 COMMANDS = torch.randint(-1, 2, (40, 2), generator=torch.Generator().manual_seed(2)).double()
 SHOWN = Demonstrations(READINGS, COMMANDS)

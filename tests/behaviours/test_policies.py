@@ -9,11 +9,10 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from plain import wide
-from robots import correct, random_pairs, same_bits, space
+from robots import KINDS, correct, random_pairs, same_bits, space
 from torch.testing import assert_close
 
 from behaviours import Behaviour, BehaviourBank, Bundle, Demonstrations, ErrorDriven, OneShot, Policy, Priority, Recall
-from torchvsa import ARCHITECTURES
 from torchvsa._numerics import inner_products
 
 NAMES = ["seek", "avoid", "cruise"]
@@ -58,7 +57,7 @@ def test_bundling_is_voting(weights: list[int], seed: int) -> None:
 
 @settings(max_examples=30, deadline=None, derandomize=True)
 @given(weights=st.lists(st.floats(-3, 3), min_size=3, max_size=3).filter(lambda w: max(map(abs, w)) > 1e-9))
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_bundling_is_voting_for_any_weights(vsa: str, weights: list[float]) -> None:
     bank, _ = taught(128, vsa, each=3)
     policy = Bundle(bank, dict(zip(NAMES, weights, strict=True)))
@@ -81,7 +80,7 @@ def test_clipping_breaks_the_vote() -> None:
     assert not torch.equal(votes(policy.behaviour.clipped().program), torch.as_tensor(clipped))
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_clipped_programs_are_bundled_as_the_votes_they_are(vsa: str) -> None:
     """Clipped programs are small types (int8, bits) whose sums are not."""
     bank, pairs = three(128, vsa, each=3)
@@ -105,7 +104,7 @@ def test_raw_and_clipped_programs_mix() -> None:
     np.testing.assert_array_equal(wide(Bundle(mixed).program), wanted)
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_a_bundle_recalls_all_of_its_parts_as_one_behaviour(vsa: str) -> None:
     bank, pairs = three(4000, vsa)
     policy = Bundle(bank)
@@ -236,7 +235,7 @@ def test_policies_are_policies() -> None:
     assert issubclass(Priority, Policy)
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_a_behaviour_of_weight_0_is_left_out(vsa: str) -> None:
     bank, pairs = three(500, vsa)
     readings = everything(pairs)
@@ -254,7 +253,7 @@ def test_a_behaviour_of_weight_0_is_left_out(vsa: str) -> None:
 
 
 @pytest.mark.parametrize("weight", [2**27, 2**28, 3_000_000_000, 2**31, 2**32, 2**40, 1e12, 2**40 + 0.5])
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_large_weights_answer_as_the_behaviour_itself(vsa: str, weight: float) -> None:
     bank, pairs = three(500, vsa)
     readings = everything(pairs)

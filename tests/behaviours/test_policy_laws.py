@@ -4,12 +4,12 @@ from collections.abc import Callable
 
 import pytest
 import torch
-from robots import SCHEMA, random_pairs, same_bits, space
+from robots import KINDS, SCHEMA, random_pairs, same_bits, space
 
 import torchvsa
 from behaviours import POLICIES, BehaviourBank, Blending, Bundle, OneShot, Policy, Priority, Recall, Space
 from behaviours.testing import check_policy
-from torchvsa import ARCHITECTURES, MAP
+from torchvsa import MAP
 from torchvsa.encoders import History, RandomFourier
 
 Make = Callable[[BehaviourBank], Policy]
@@ -18,8 +18,8 @@ policies = pytest.mark.parametrize("make", POLICIES.values(), ids=POLICIES.keys(
 COMBINATIONS = [
     pytest.param(make, vsa, id=f"{name}-{vsa}")
     for name, make in POLICIES.items()
-    for vsa in ARCHITECTURES
-    if not isinstance(make, type) or make.supports(torchvsa.architecture(vsa, 8))
+    for vsa in KINDS
+    if not isinstance(make, type) or make.supports(torchvsa.architecture_near(vsa, 8))
 ]
 combinations = pytest.mark.parametrize(("make", "vsa"), COMBINATIONS)
 # Each policy in two architectures, of which one is no MAP, and each architecture with several policies: the laws take
@@ -27,7 +27,7 @@ combinations = pytest.mark.parametrize(("make", "vsa"), COMBINATIONS)
 SOME = [
     combination
     for turn, name in enumerate(POLICIES)
-    for place, vsa in enumerate(ARCHITECTURES)
+    for place, vsa in enumerate(KINDS)
     for combination in COMBINATIONS
     if combination.id == f"{name}-{vsa}" and place % 3 == turn % 3
 ]

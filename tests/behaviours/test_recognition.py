@@ -5,11 +5,11 @@ import math
 import pytest
 import torch
 from if_else import SCHEMA, Rules, learned, readings, space, variants
-from robots import random_pairs
+from robots import KINDS, random_pairs
 from robots import space as other_space
 
 from behaviours import BehaviourBank, Demonstrations, OneShot, Recognition, Space, recognise
-from torchvsa import ARCHITECTURES, MAP
+from torchvsa import MAP
 from torchvsa.encoders import History, Level, Product
 
 NAMES = ("seek", "flee", "near", "blind")
@@ -79,7 +79,7 @@ def test_the_lengths_of_programs_do_not_matter() -> None:
     assert torch.allclose(recognise(bank, x, commands).scores, recognise(BANK, x, commands).scores)
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_behaviours_with_different_results_compete(vsa: str) -> None:
     bank = BehaviourBank(other_space(500, vsa))
     for number in range(3):

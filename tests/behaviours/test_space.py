@@ -4,10 +4,10 @@ from typing import Any, cast
 
 import pytest
 import torch
-from robots import SCHEMA, same_bits, space
+from robots import KINDS, SCHEMA, same_bits, space
 
 from behaviours import Space
-from torchvsa import ARCHITECTURES, MAP, SelfShift
+from torchvsa import MAP, SelfShift
 from torchvsa.encoders import Level, Lookup, Product, Sum
 
 
@@ -15,7 +15,7 @@ def bits(made: Space) -> dict[str, torch.Tensor]:
     return {k: torch.view_as_real(v) if v.is_complex() else v for k, v in made.state_dict().items()}
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_the_seed_decides_every_codebook(vsa: str) -> None:
     torch.manual_seed(1)
     one = bits(space(128, vsa, seed=5))

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 import torch
-from robots import SCHEMA, encoder, random_pairs, same_bits, space
+from robots import KINDS, SCHEMA, encoder, random_pairs, same_bits, space
 from safetensors.torch import load
 from saved import SAVERS, bank
 
 import torchvsa
 from behaviours import BehaviourBank, Demonstrations, OneShot, Space
 from behaviours.storage import load_tensors, save_tensors
-from torchvsa import ARCHITECTURES
 from torchvsa.encoders import History
 
 
@@ -25,7 +24,7 @@ def real(tensor: torch.Tensor) -> torch.Tensor:
     return torch.view_as_real(tensor) if tensor.is_complex() else tensor
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 @pytest.mark.parametrize(
     "protection", ["none", {"name": "fixed_shift", "shift": 5}, {"name": "self_shift", "width": "sum"}], ids=str
 )

@@ -7,11 +7,10 @@ from pathlib import Path
 import pytest
 import torch
 from plain import wide
-from robots import correct, random_pairs, same_bits, space
+from robots import KINDS, correct, random_pairs, same_bits, space
 
 from behaviours import Behaviour, BehaviourBank, Bundle, OneShot
 from behaviours.behaviour import Behaviour as Documented
-from torchvsa import ARCHITECTURES
 
 
 def ten_lines() -> str:
@@ -52,7 +51,7 @@ def test_ten_lines_teach_what_one_superposition_does_not_hold(tmp_path: Path) ->
     assert [p.shape for p in loaded.trainable().parameters()] == [(2000,)]
 
 
-@pytest.mark.parametrize("vsa", ARCHITECTURES)
+@pytest.mark.parametrize("vsa", KINDS)
 def test_scores_are_those_of_recall_and_have_their_gradient(vsa: str) -> None:
     shown = random_pairs(8)
     behaviour = OneShot().fit(space(128, vsa), shown).trainable()

@@ -24,7 +24,15 @@ def right(behaviour: Controller) -> np.ndarray:
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(("name", "dtype"), KINDS)
 def test_all_eight_cases(name: str, dtype: str | None, seed: int) -> None:
-    behaviour = hand_written.behaviour(torchvsa.architecture(name, 4000, dtype), seed)
+    vsa = torchvsa.architecture_near(name, 4000, dtype)
+    if isinstance(vsa, torchvsa.BSDC) and seed == 1:
+        # Two of the cases have the same width by chance: 28 pairs of cases, 4,000 widths.
+        cases = hand_written.space(vsa, seed).encode(torch.tensor(hand_written.CASES))
+        assert len(vsa.width(cases).unique()) == 7
+        with pytest.raises(ValueError, match="no weights of the 8 rules"):
+            hand_written.behaviour(vsa, seed)
+        return
+    behaviour = hand_written.behaviour(vsa, seed)
     assert right(behaviour).all()
     assert right(behaviour.freeze()).all()
 
@@ -34,27 +42,28 @@ def test_few_dimensions_are_refused_rather_than_wrong(name: str) -> None:
     written, refusals = [], []
     for seed in range(20):
         try:
-            written.append(hand_written.behaviour(torchvsa.architecture(name, 24), seed))
+            written.append(hand_written.behaviour(torchvsa.architecture_near(name, 24), seed))
         except ValueError as error:
             refusals.append(str(error))
     assert all(right(behaviour).all() for behaviour in written)
     assert refusals
-    assert all("no weights of the five rules" in refusal for refusal in refusals)
+    assert all("no weights of the" in refusal for refusal in refusals)
 
 
 @pytest.mark.parametrize(("name", "dtype"), KINDS)
 def test_the_program_is_the_sum_of_the_rules_with_whole_weights(name: str, dtype: str | None) -> None:
-    behaviour = hand_written.behaviour(torchvsa.architecture(name, 4000, dtype), 0)
+    behaviour = hand_written.behaviour(torchvsa.architecture_near(name, 4000, dtype), 0)
     pairs = rules(behaviour)
     weights = torch.linalg.lstsq(as_columns(pairs), as_columns(behaviour.program[None])).solution[:, 0]
     torch.testing.assert_close(weights, weights.round(), atol=1e-4, rtol=0)
     assert (weights.round() >= 1).all()
 
 
-@pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
+# Conditions that are shifts do not resemble each other, so that rules do not disturb each other either.
+@pytest.mark.parametrize("name", [name for name in torchvsa.ARCHITECTURES if name != "BSDC-S"])
 def test_the_weights_are_needed(name: str) -> None:
     """With equal weights the five rules shout each other down in at least one of the eight cases."""
-    behaviour = hand_written.behaviour(torchvsa.architecture(name, 4000), 0)
+    behaviour = hand_written.behaviour(torchvsa.architecture_near(name, 4000), 0)
     behaviour.program = behaviour.space.vsa.superpose(rules(behaviour))
     assert not right(behaviour).all()
 
@@ -73,10 +82,17 @@ def test_one_hypervector_of_five_rules() -> None:
 
 
 def rules(behaviour: Behaviour) -> torch.Tensor:
-    """The five pairs of condition and result `[5, d]`."""
+    """The pairs of condition and result `[5, d]`, or `[8, d]`."""
     space = behaviour.space
     items = space.items(space.schema.command_levels(TEACHER_COMMANDS))
-    return space.vsa.bind(items, space.encode(torch.tensor(hand_written.RULES)))
+    conditions = hand_written.written(space.vsa)
+    fired = [next(i for i, rule in enumerate(hand_written.RULES) if holds(rule, case)) for case in conditions]
+    return space.vsa.bind(items[fired], space.encode(torch.tensor(conditions)))
+
+
+def holds(rule: tuple[int, ...], case: tuple[int, ...]) -> bool:
+    """Whether a rule speaks in a case, or is it."""
+    return all(a in (b, hand_written.EITHER) for a, b in zip(rule, case, strict=True))
 
 
 def as_columns(rows: torch.Tensor) -> torch.Tensor:

@@ -162,3 +162,72 @@ def test_powers_are_the_points_of_a_fractional_power_encoding(name: str) -> None
     for value in (0.0, 0.3, -1.7, 2.0):
         expected = plain(encode(torch.tensor([[value]])))[0].detach()
         assert_close(vsa.power(base, value), expected, rtol=1e-4, atol=1e-4)
+
+
+def test_vtb_multiplies_by_the_same_matrices() -> None:
+    vsa = torchvsa.VTB(900)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+    peer: Any = torchhd.ensure_vsa_tensor(x.clone(), "VTB")
+    assert_close(vsa.bind(x[0], x[1]), plain(torchhd.bind(peer[0], peer[1])))
+    assert_close(vsa.unbind(x[0], x[1]), plain(torchhd.bind(peer[0], torchhd.inverse(peer[1]))))
+    assert_close(vsa.identity(), plain(torchhd.identity(1, 900, "VTB")[0]))
+    assert_close(vsa.superpose(x), plain(torchhd.multibundle(peer)))
+    assert_close(vsa.similarity(x[0][:, None], x[1]), plain(torchhd.cosine_similarity(peer[0], peer[1])))
+
+
+def test_mcr_adds_the_same_numbers() -> None:
+    vsa = torchvsa.MCR(DIM)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+    peer: Any = vsa.numbers(x).long().as_subclass(torchhd.MCRTensor)
+    peer.block_size = 16
+    assert torch.equal(vsa.numbers(vsa.bind(x[0], x[1])).long(), plain(torchhd.bind(peer[0], peer[1])))
+    back = torchhd.bind(peer[0], torchhd.inverse(peer[1]))
+    assert torch.equal(vsa.numbers(vsa.unbind(x[0], x[1])).long(), plain(back))
+    # Of five summands few sums are halfway between two numbers, where rounding decides, or 0.
+    bundled, theirs = vsa.numbers(vsa.bundle(x)).long(), plain(torchhd.multibundle(peer))
+    assert (bundled == theirs).double().mean() > 0.99
+
+
+def test_sparse_block_codes_add_the_same_places() -> None:
+    vsa = torchvsa.BSDCSEG(900)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+
+    def places(codes: Tensor) -> Tensor:
+        return codes.unflatten(-1, (vsa.places, vsa.blocks)).argmax(-2)
+
+    peer: Any = places(x).as_subclass(torchhd.BSBCTensor)
+    peer.block_size = vsa.places
+    assert torch.equal(places(vsa.bind(x[0], x[1])), plain(torchhd.bind(peer[0], peer[1])))
+    back = torchhd.bind(peer[0], torchhd.inverse(peer[1]))
+    assert torch.equal(places(vsa.unbind(x[0], x[1])), plain(back))
+    assert torch.equal(places(vsa.identity()), plain(torchhd.identity(1, 30, "BSBC", block_size=30)[0]))
+    # Codes of the same blocks: torch-hd counts equal places, a cosine divides them by the number of blocks.
+    equal = (places(x[0])[:, None] == places(x[1])).double().sum(-1)
+    assert_close(vsa.similarity(x[0][:, None], x[1]).double(), equal / vsa.blocks)
+
+
+def test_what_is_made_of_the_operations_of_vtb() -> None:
+    vsa = torchvsa.VTB(900)
+    x = vsa.random(2, 4, 7, generator=torch.Generator().manual_seed(0))
+    peer: Any = torchhd.ensure_vsa_tensor(x.clone(), "VTB")
+    assert_close(vsa.sequence(x[0], raw=True), plain(torchhd.bundle_sequence(peer[0])))
+    assert_close(vsa.ngrams(x[0], raw=True), plain(torchhd.ngrams(peer[0])), rtol=1e-4, atol=1e-5)
+    assert_close(vsa.ngrams(x[0], 7, raw=True), plain(torchhd.bind_sequence(peer[0])), rtol=1e-4, atol=1e-5)
+    # torch-hd's table takes the values for the keys, with which its own `get` does not unbind.
+    assert_close(vsa.record(x[0], x[1], raw=True), plain(torchhd.hash_table(peer[1], peer[0])))
+    assert torch.equal(vsa.inverse(x), plain(torchhd.inverse(peer)))
+
+
+def test_what_is_made_of_the_operations_of_mcr() -> None:
+    vsa = torchvsa.MCR(DIM)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+    peer: Any = vsa.numbers(x).long().as_subclass(torchhd.MCRTensor)
+    peer.block_size = 16
+    assert torch.equal(vsa.numbers(vsa.inverse(x)).long(), plain(torchhd.inverse(peer)))
+    assert torch.equal(vsa.numbers(vsa.ngrams(x[0], 5)).long(), plain(torchhd.bind_sequence(peer[0])))
+    assert torch.equal(vsa.numbers(vsa.power(x, -3)).long(), (-3 * plain(peer)) % 16)
+    bound = vsa.bind(x[0], x[1])
+    theirs: Any = torchhd.bind(peer[0], peer[1])
+    equal = plain(torchhd.hamming_similarity(theirs, peer[0]))
+    assert torch.equal(vsa.hamming_similarity(bound[:, None], x[0]), equal)
+    assert (vsa.hamming_similarity(vsa.unbind(bound, x[1]), x[0]) == DIM).all()

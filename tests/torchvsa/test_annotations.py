@@ -8,8 +8,8 @@ import pytest
 
 SUITES = ["test_laws.py", "encoders/test_encoder_laws.py", "encoders/test_records.py"]
 CHOSEN = "test_laws.py or test_records.py or keep_the_laws"
-SAME_CODE = "MAP-B or MAP-I or MAP-C-float32 or overflow"
-"""Encoders in these run the lines that they run in MAP-C's integers, with the same symbolic shapes."""
+SAME_CODE = "MAP-B or MAP-I or MAP-C-float32 or overflow or MBAT or MCR or VTB or BSDC"
+"""Encoders in these run the lines that they run in MAP-C's integers or in HRR, with the same symbolic shapes."""
 SAME_LAWS = "test_encoder_laws.py and (HRR-float32 or -HRR-None or BSC)"
 """What is not element-wise, or not a number, is bound and bundled in records, too."""
 

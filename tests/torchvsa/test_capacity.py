@@ -25,21 +25,27 @@ NEEDED = {
     "HRR": (510, 520),
     "FHRR": (330, 340),
     "BSC": (750, 750),
+    "VTB": (500, 550),
+    "MBAT": (480, 570),
+    "BSDC-S": (320, 570),
 }
 
 
 def space(name: str, dim: int) -> VSA:
     # The measurements of MAP-C used uniform atoms.
-    return torchvsa.MAP(dim, atoms="uniform") if name == "MAP-C" else torchvsa.architecture(name, dim)
+    return torchvsa.MAP(dim, atoms="uniform") if name == "MAP-C" else torchvsa.architecture_near(name, dim)
 
 
 def members(name: str, dim: int) -> float:
     vsa = space(name, dim)
     found = 0.0
     for seed in range(10):
-        atoms = vsa.random(1000, generator=torch.Generator().manual_seed(seed))
-        nearest = vsa.similarity(vsa.bundle(atoms[:15]), atoms).topk(15).indices
-        found += (nearest < 15).float().mean().item()
+        generator = torch.Generator().manual_seed(seed)
+        atoms = vsa.random(1000, generator=generator)
+        # Anywhere among the atoms, so that equal similarities, as of sparse codes, favour nobody.
+        own = torch.randperm(1000, generator=generator)[:15]
+        nearest = vsa.similarity(vsa.bundle(atoms[own]), atoms).topk(15).indices
+        found += torch.isin(nearest, own).float().mean().item()
     return found / 10
 
 
@@ -49,7 +55,7 @@ def pairs(name: str, dim: int) -> float:
     for seed in range(10):
         atoms = vsa.random(1000, generator=torch.Generator().manual_seed(seed))
         keys, values = atoms[:15], atoms[15:30]
-        match = torchvsa.CleanUp(atoms)(vsa.unbind(vsa.bundle(vsa.bind(keys, values)), keys))
+        match = torchvsa.CleanUp(atoms)(vsa.unbind(vsa.bundle(vsa.bind(values, keys)), keys))
         right += (match.index == torch.arange(15, 30)).float().mean().item()
     return right / 10
 
@@ -65,7 +71,7 @@ def test_a_bundle_holds_as_much_as_measured_elsewhere(name: str) -> None:
 def test_a_program_of_bound_pairs_holds_as_much_as_measured_elsewhere(name: str) -> None:
     dim = NEEDED[name][1]
     assert 0.95 < pairs(name, dim) <= 1
-    assert pairs(name, dim // 2) < 0.95
+    assert pairs(name, dim // 2) < (0.98 if name == "BSDC-S" else 0.95)
 
 
 def bundled(name: str, summands: NDArray[Any], rng: np.random.Generator) -> NDArray[Any]:
@@ -75,12 +81,38 @@ def bundled(name: str, summands: NDArray[Any], rng: np.random.Generator) -> NDAr
         return np.sign(total + (rng.choice([-1.0, 1.0], total.shape) if len(summands) % 2 == 0 else 0))
     if name in ("MAP-C", "MAP-C uniform"):
         return np.clip(total, -1, 1)
+    if name == "MCR":
+        steps = np.angle(total) * 8 / math.pi
+        return np.where(np.abs(total) < 1e-9, 0, np.exp(1j * math.pi / 8 * np.ceil(steps - 0.5 - 1e-6)))
     return total / np.abs(total) if name == "FHRR" else total
 
 
-def vectors(name: str, count: int, dim: int, rng: np.random.Generator) -> NDArray[Any]:
+def bound(name: str, values: NDArray[Any], keys: NDArray[Any], undo: bool = False) -> NDArray[Any]:
+    """Each value with its key, row by row; or unbound from it, where the key must be undone."""
     if name == "HRR":
+        spectra = np.fft.fft(keys)
+        return np.fft.ifft(np.fft.fft(values) * (spectra.conj() if undo else spectra)).real
+    if name == "VTB":
+        side = math.isqrt(keys.shape[-1])
+        matrices = side**0.5 * keys.reshape(-1, side, side)
+        parts = values.reshape(-1, side, side)
+        return np.einsum("nab,nbc->nac" if undo else "nab,ncb->nac", parts, matrices).reshape(len(keys), -1)
+    if name == "MBAT":
+        # Quaternions as 2 x 2 matrices of complex numbers, which multiply alike; elements here are ±1, not ±1/√d.
+        left, right = (x.reshape(len(x), 4, -1) for x in (np.broadcast_to(values, keys.shape), keys))
+        (a, b), (c, e) = ((x[:, 0] + 1j * x[:, 1], x[:, 2] + 1j * x[:, 3]) for x in (left, right))
+        if undo:
+            c, e = c.conj(), -e
+        first, second = a * c - b * e.conj(), a * e + b * c.conj()
+        return np.concatenate([first.real, first.imag, second.real, second.imag], -1) / 2
+    return values * (keys.conj() if undo else keys)
+
+
+def vectors(name: str, count: int, dim: int, rng: np.random.Generator) -> NDArray[Any]:
+    if name in ("HRR", "VTB"):
         return rng.normal(size=(count, dim)) / math.sqrt(dim)
+    if name == "MCR":
+        return np.exp(2j * math.pi / 16 * rng.integers(16, size=(count, dim)))
     if name == "FHRR":
         return np.exp(1j * rng.uniform(-math.pi, math.pi, (count, dim)))
     return rng.uniform(-1, 1, (count, dim)) if name == "MAP-C uniform" else rng.choice([-1.0, 1.0], (count, dim))
@@ -94,14 +126,9 @@ def drawn(name: str, dim: int, k: int, items: int, trials: int, kind: str, raw: 
         atoms, keys = vectors(name, items, dim, rng), vectors(name, k, dim, rng)
         # Anywhere among the items, so that equal scores favour nobody.
         own = rng.permutation(items)[:k]
-        spectra = np.fft.fft(keys)
-        pairs = np.fft.ifft(spectra * np.fft.fft(atoms[own])).real if name == "HRR" else keys * atoms[own]
-        held = pairs if kind == "pairs" else atoms[own]
+        held = bound(name, atoms[own], keys) if kind == "pairs" else atoms[own]
         program = held.sum(0) if raw else bundled(name, held, rng)
-        if kind == "pairs":
-            noisy = np.fft.ifft(np.fft.fft(program) * spectra.conj()).real if name == "HRR" else program * keys.conj()
-        else:
-            noisy = program[None]
+        noisy = bound(name, program, keys, undo=True) if kind == "pairs" else program[None]
         scores = np.real(noisy @ atoms.conj().T) / np.linalg.norm(atoms, axis=1)
         if kind == "pairs":
             right += np.mean(scores.argmax(1) == own)
@@ -115,16 +142,21 @@ def formula(name: str, dim: int, k: int, items: int, kind: Any, raw: bool = Fals
     return recall_probability(name.split()[0], dim, k, items, atoms, kind=kind, raw=raw)
 
 
-PER_VECTOR = {"MAP-I": 18, "MAP-B": 28, "MAP-C": 28, "BSC": 28, "MAP-C uniform": 24, "HRR": 20, "FHRR": 12}
+PER_VECTOR = {"MAP-I": 18, "MAP-B": 28, "MAP-C": 28, "BSC": 28, "MAP-C uniform": 24, "HRR": 20, "FHRR": 12} | {
+    "VTB": 20,
+    "MBAT": 18,
+    "MCR": 12,
+}
 """Dimensions for each of k vectors with which about .93 of them are found among 200."""
 
 
 @pytest.mark.parametrize("name", PER_VECTOR)
 @pytest.mark.parametrize("kind", ["pairs", "bundle"])
-@pytest.mark.parametrize("k", [2, 5, 15, 24])
+@pytest.mark.parametrize("k", [2, 7, 24])
 def test_the_closed_form_is_what_a_simulation_tends_to(name: str, kind: str, k: int) -> None:
     # 1,500 decisions: a standard deviation of at most .007.
     dim = max(PER_VECTOR[name] * k, 64)
+    dim = math.isqrt(dim) ** 2 if name == "VTB" else dim - dim % 4
     assert drawn(name, dim, k, 200, 1500 // k, kind) == pytest.approx(formula(name, dim, k, 200, kind), abs=0.02)
 
 
@@ -159,6 +191,9 @@ def test_the_closed_form_of_clipped_uniform_atoms() -> None:
         ("MAP-C uniform", "pairs", 41.8, -4.8),
         ("MAP-B", "bundle", 50.4, 36.9),
         ("MAP-I", "bundle", 31.8, -2.8),
+        ("VTB", "pairs", 32.7, 58.0),
+        ("MBAT", "bundle", 33.5, -24.9),
+        ("VTB", "bundle", 30.9, 39.9),
         ("HRR", "bundle", 31.8, 37.7),
         ("FHRR", "bundle", 22.0, 3.1),
         ("MAP-C uniform", "bundle", 44.3, -27.2),

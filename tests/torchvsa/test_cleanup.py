@@ -61,7 +61,12 @@ def test_every_space_is_cleaned_up(vsa: VSA) -> None:
     exact = [
         x.numpy().astype(np.complex128 if x.is_complex() else np.float64) for x in map(as_bipolar, (queries, items))
     ]
-    assert_matches(match, oracle(*exact))
+    expected = oracle(*exact)
+    # Equal scores in whole numbers are rounded in floats: there any of the best will do.
+    clear = torch.from_numpy(expected[2] > 1e-5)
+    index = torch.where(clear, torch.from_numpy(expected[0]), match.index).numpy()
+    assert_matches(match, (index, *expected[1:]))
+    assert clear.double().mean() > 0.5  # sparse items often have the same score
     assert match.index[0, 0] == 7
     assert_close(match.similarity, vsa.similarity(queries, items[match.index]))
 

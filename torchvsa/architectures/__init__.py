@@ -7,9 +7,14 @@ import torch
 
 from torchvsa.architectures.base import VSA
 from torchvsa.architectures.bsc import BSC
+from torchvsa.architectures.bsdc import BSDC
+from torchvsa.architectures.bsdc_seg import BSDCSEG
 from torchvsa.architectures.fhrr import FHRR
 from torchvsa.architectures.hrr import HRR
 from torchvsa.architectures.map import MAP
+from torchvsa.architectures.mbat import MBAT
+from torchvsa.architectures.mcr import MCR
+from torchvsa.architectures.vtb import VTB
 from torchvsa.registry import Registry
 
 ARCHITECTURES: Registry[Callable[..., VSA]] = Registry(
@@ -21,6 +26,11 @@ ARCHITECTURES: Registry[Callable[..., VSA]] = Registry(
         "HRR": HRR,
         "FHRR": FHRR,
         "BSC": BSC,
+        "BSDC-S": BSDC,
+        "BSDC-SEG": BSDCSEG,
+        "MBAT": MBAT,
+        "MCR": MCR,
+        "VTB": VTB,
     },
 )
 
@@ -39,4 +49,31 @@ def architecture(name: str, dim: int, dtype: str | torch.dtype | None = None, **
     return make(dim=dim, **({} if dtype is None else {"dtype": dtype}), **options)
 
 
-__all__ = ["ARCHITECTURES", "BSC", "FHRR", "HRR", "MAP", "VSA", "architecture"]
+def architecture_near(name: str, dim: int, dtype: str | torch.dtype | None = None, **options: str) -> VSA:
+    """Make an architecture with the number of dimensions nearest to `dim` that it allows; of two the smaller one."""
+    ARCHITECTURES.find(name)
+    problem = None
+    for apart in range(dim):
+        for near in (dim - apart, dim + apart):
+            try:
+                return architecture(name, near, dtype, **options)
+            except ValueError as error:
+                problem = problem or error
+    raise ValueError(f"{name} can be made with no number of dimensions from 1 to {2 * dim - 1}: {problem}")
+
+
+__all__ = [
+    "ARCHITECTURES",
+    "BSC",
+    "BSDC",
+    "BSDCSEG",
+    "FHRR",
+    "HRR",
+    "MAP",
+    "MBAT",
+    "MCR",
+    "VSA",
+    "VTB",
+    "architecture",
+    "architecture_near",
+]

@@ -73,7 +73,7 @@ class Derived(ABC):
 
         Rotations tell the order of the members only where `permute` does not commute with `bind`. It does in HRR: there
         all orders of the same members have the same n-gram. Reorder the elements of `xs[..., i, :]` with a random order
-        per place in advance, or use `sequence`.
+        per place in advance, or use `sequence`. In BSDC-S, n-grams tell the first member, but not the order of others.
 
         Args:
             xs: `[..., k, d]` for the default `dim`, or a list or tuple of `k` hypervectors `[..., d]`.

@@ -43,6 +43,8 @@ class VSA(Derived):
     """Whether `bind` and `unbind` are linear in the key too, so that `readout` can fold programs into items."""
     self_inverse: bool = False
     """Whether binding twice with the same key gives back the hypervector."""
+    exact: bool = False
+    """Whether `unbind(bind(a, key), key)` is `a`, up to rounding, for every key that `random` draws."""
     negatable: ClassVar[bool] = True
     """Whether hypervectors have a `negative`."""
     sparse: ClassVar[bool] = False
@@ -82,6 +84,14 @@ class VSA(Derived):
         The constructor of `VSA` calls it: an override may read attributes that are set before `super().__init__()`.
         """
         return True
+
+    @property
+    def blocks(self) -> int:
+        """The number of blocks; element i belongs to block i mod `blocks`. `dim` by default: one element each.
+
+        Encoders that mix or reorder the elements of hypervectors keep the elements of a block together.
+        """
+        return self.dim
 
     @property
     def integer(self) -> bool:

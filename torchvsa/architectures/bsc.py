@@ -24,6 +24,7 @@ class BSC(VSA):
 
     name = "BSC"
     self_inverse = True
+    exact = True
     breaks_ties = True
     in_place = "bitwise_xor_"
 

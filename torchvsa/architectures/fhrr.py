@@ -20,10 +20,11 @@ class FHRR(VSA):
     """
 
     name = "FHRR"
+    exact = True
 
     def __init__(self, dim: int, dtype: torch.dtype = torch.complex64) -> None:
         if dtype not in (torch.complex64, torch.complex128):
-            raise ValueError(f"FHRR holds complex64 or complex128; got {dtype}")
+            raise ValueError(f"{self.name} holds complex64 or complex128; got {dtype}")
         super().__init__(dim, dtype)
 
     def random(
@@ -60,7 +61,7 @@ class FHRR(VSA):
         return safe_divide(raw, raw.abs())
 
     @property
-    def frequencies(self) -> int:
+    def frequencies(self) -> int | None:
         """One angle per element."""
         return self.dim
 

@@ -4,11 +4,10 @@ import torch
 from jaxtyping import Float, Shaped
 from torch import Tensor
 
-from torchvsa._numerics import in_range, safe_divide
-from torchvsa.architectures.base import VSA
+from torchvsa.architectures._unit_length import NormalElements
 
 
-class HRR(VSA):
+class HRR(NormalElements):
     """Holographic Reduced Representations: bind is circular convolution, bundle the sum scaled to length 1.
 
     Elements are drawn from a normal distribution of variance 1/d. Unbind is circular correlation, an approximate
@@ -18,21 +17,6 @@ class HRR(VSA):
     """
 
     name = "HRR"
-    elementwise = False
-
-    def __init__(self, dim: int, dtype: torch.dtype = torch.float32) -> None:
-        if dtype not in (torch.float32, torch.float64):
-            raise ValueError(f"HRR holds float32 or float64; got {dtype}")
-        super().__init__(dim, dtype)
-
-    def random(
-        self, *shape: int, generator: torch.Generator | None = None, device: torch.device | str | None = None
-    ) -> Shaped[Tensor, "*shape d"]:
-        """Normal elements with mean 0 and variance 1/d."""
-        self.require_room(shape, 2 * self.dtype.itemsize, generator)
-        source = generator.device if generator is not None else device
-        normal = torch.randn(*shape, self.dim, generator=generator, device=source, dtype=self.dtype)
-        return (normal / self.dim**0.5).to(device if device is not None else source)
 
     def identity(self) -> Shaped[Tensor, "d"]:
         """1 at index 0, 0 elsewhere."""
@@ -53,11 +37,6 @@ class HRR(VSA):
             return a * b
         spectrum = torch.fft.rfft(b)
         return torch.fft.irfft(torch.fft.rfft(a) * (spectrum.conj() if conjugate else spectrum), n=self.dim)
-
-    def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """Scale to length 1; a zero vector stays zero."""
-        rows, lengths, _ = in_range(raw)
-        return safe_divide(rows, lengths[..., None].to(rows.dtype))
 
     def inverse(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """The involution, element -i modulo d at index i: the spectrum's angles are negated, its magnitudes kept."""
@@ -83,13 +62,3 @@ class HRR(VSA):
         ends = torch.zeros_like(angles[..., :1]) if angles.shape[-1] else angles.new_zeros(*angles.shape[:-1], 1)
         whole = torch.cat([ends, angles] + ([ends] if self.dim % 2 == 0 else []), -1)
         return torch.fft.irfft(torch.polar(torch.ones_like(whole), whole), n=self.dim).to(self.dtype)
-
-    def _are_codes(self, x: Shaped[Tensor, "*batch d"]) -> bool:
-        # Ten standard deviations: no drawn element is that far from 0.
-        return bool((x.abs() <= 10 / self.dim**0.5).all())
-
-    def unbundle(
-        self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
-    ) -> Shaped[Tensor, "*#batch d"]:
-        """Estimate `x`: the sum of two nearly orthogonal vectors of length 1 has length √2."""
-        return self.normalize(bundled * 2**0.5 - known)

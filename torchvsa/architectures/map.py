@@ -55,7 +55,7 @@ class MAP(VSA):
         self.name = f"MAP-{variant}"
         self.breaks_ties = variant == "B"
         self.clips = variant == "C"
-        self.self_inverse = atoms == "bipolar"
+        self.self_inverse = self.exact = atoms == "bipolar"
 
     def config(self) -> dict[str, str | int]:
         """Name, dim and dtype, and the atoms if they are not the default."""

@@ -93,13 +93,22 @@ def _uniform(stored: Stored) -> Score:
 
 
 def _holographic(stored: Stored) -> Score:
+    power = stored.count + 1  # unbinding doubles the power of the right pair
+    return _normal(stored, 1 - 2 / power + 4 / power**3)
+
+
+def _vector_derived(stored: Stored) -> Score:
+    power = stored.count + 1
+    return _normal(stored, 1 - 2 / power + 1 / (2 * power**2) + 1 / power**3)
+
+
+def _normal(stored: Stored, variance: float) -> Score:
     # Products of normal vectors are compared by Fisher's z, the arc tangent of their cosine, whose deviation is
     # 1 / √(d - 2): by a cosine as large as that of a few summands the normal approximation would be off.
     k = stored.count
     if not stored.bound:
         return Score(math.atanh(1 / math.sqrt(k)), 1.0, 2) if k > 1 else Score(1.0, 0.0)
-    power = k + 1  # unbinding doubles the power of the right pair
-    variance = 1 - 2 / power + 4 / power**3
+    power = k + 1
     return Score(math.atanh(1 / math.sqrt(power)), math.sqrt(variance) / (1 - 1 / power), 2)
 
 
@@ -107,6 +116,16 @@ def _phasors(stored: Stored) -> Score:
     if stored.raw:
         return Score(math.sqrt(2 / stored.count), _sum(stored).spread)
     first, second = _harmonics(stored.count)
+    return Score(math.sqrt(2) * first, math.sqrt(max(1 + second - 2 * first**2, 0.0)))
+
+
+def _modular(stored: Stored) -> Score:
+    if stored.raw or stored.count == 1:
+        return _phasors(stored)
+    # Rounding to the nearest of 16 angles adds an error that is uniform within half a step, independent of the sum.
+    step = math.pi / 16
+    first, second = _harmonics(stored.count)
+    first, second = first * math.sin(step) / step, second * math.sin(2 * step) / (2 * step)
     return Score(math.sqrt(2) * first, math.sqrt(max(1 + second - 2 * first**2, 0.0)))
 
 
@@ -132,6 +151,9 @@ CLOSED_FORMS: dict[str, Callable[[Stored], Score]] = {
     "BSC": _majority,
     "HRR": _holographic,
     "FHRR": _phasors,
+    "MBAT": _sum,  # unbinding is a rotation of blocks, under which noise stays as it is
+    "MCR": _modular,
+    "VTB": _vector_derived,
 }
 """The score of the right item, by the name of the architecture."""
 

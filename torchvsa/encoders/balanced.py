@@ -18,6 +18,7 @@ class Balanced(Binned):
     """
 
     name = "balanced"
+    negates = True
 
     def _codes(self, generator: torch.Generator | None) -> Shaped[Tensor, "bins d"]:
         start = self.vsa.random(generator=generator)

@@ -2,7 +2,7 @@
 
 import copy
 from abc import abstractmethod
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import torch
 from jaxtyping import Float, Int64, Shaped
@@ -108,10 +108,14 @@ class Binned(ValueEncoder):
     Bin b holds b / bins <= x < (b + 1) / bins; 1 is in the last bin. A subclass implements `_codes`.
     """
 
+    negates: ClassVar[bool] = False
+    """Whether codes consist of elements and their negatives, for which the architecture must be `negatable`."""
     codes: Tensor
 
     def __init__(self, vsa: VSA, bins: int, seed: int | None = None) -> None:
         super().__init__()
+        if self.negates:
+            require_negatable(vsa, type(self).__name__)
         self.vsa, self.bins = vsa, whole("bins", bins)
         self._own(seed)
 
@@ -179,6 +183,14 @@ def check_range(x: Float[Tensor, "*batch"]) -> None:
 def planned(part: P) -> P:
     """Copy a plan, so that the part that takes it can draw the copy; return a drawn part as it is."""
     return part if part.drawn else copy.deepcopy(part)
+
+
+def require_negatable(vsa: VSA, encoder: str) -> None:
+    """Raise `ValueError`, naming alternatives, unless hypervectors have negatives."""
+    if not vsa.negatable:
+        raise ValueError(
+            f"{encoder} codes negate elements, which {vsa.name} cannot; take Level or Lookup codes in a record"
+        )
 
 
 def whole(name: str, value: int, least: int = 1) -> int:

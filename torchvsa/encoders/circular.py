@@ -18,6 +18,7 @@ class Circular(Binned):
     """
 
     name = "circular"
+    negates = True
 
     def cells(self, x: Float[Tensor, "*batch"]) -> Int64[Tensor, "*batch"]:
         """The bin of each reading; 1 is in the first bin, like 0."""

@@ -16,8 +16,9 @@ class Product(Record):
     """The product of the role-bound values. Its kernel **multiplies** the kernels of the values.
 
     If binding commutes, a product of roles and shared values does not tell which sensor has which value. Therefore the
-    i-th role-bound value is permuted i times. Circular convolution commutes with rotations too, so architectures whose
-    binding is not element-wise permute the elements of each sensor but the first in a random order instead.
+    i-th role-bound value is permuted i times. Convolutions and shifts commute with rotations too, and small
+    matrices nearly commute with each other, so architectures whose binding is not element-wise put the elements (or
+    blocks, see `VSA.blocks`) of each sensor but the first into a random order instead.
     """
 
     name = "product"
@@ -44,8 +45,10 @@ class Product(Record):
     def _arrange(self, generator: torch.Generator | None) -> Mapping[str, Tensor]:
         if not self._reorders:
             return {}
-        orders = [torch.randperm(self.vsa.dim, generator=generator) for _ in range(self.sensors - 1)]
-        return {"arrangement": torch.stack([torch.arange(self.vsa.dim), *orders])}
+        dim, blocks = self.vsa.dim, self.vsa.blocks
+        first = torch.arange(0, dim, blocks)[:, None]
+        orders = [first + torch.randperm(blocks, generator=generator) for _ in range(self.sensors - 1)]
+        return {"arrangement": torch.stack([torch.arange(dim), *(order.flatten() for order in orders)])}
 
     def _bound(self, roles: Shaped[Tensor, "n 1 d"], codes: Shaped[Tensor, "#n k d"]) -> Shaped[Tensor, "n k d"]:
         bound = super()._bound(roles, codes)

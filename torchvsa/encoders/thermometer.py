@@ -17,6 +17,7 @@ class Thermometer(Binned):
     """
 
     name = "thermometer"
+    negates = True
 
     def _codes(self, generator: torch.Generator | None) -> Shaped[Tensor, "bins d"]:
         start = self.vsa.random(generator=generator)

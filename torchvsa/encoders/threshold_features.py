@@ -10,7 +10,7 @@ from torch import Tensor
 from torchvsa._checks import whole_number
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
-from torchvsa.encoders.base import Encoder, binned, whole
+from torchvsa.encoders.base import Encoder, binned, require_negatable, whole
 from torchvsa.part import Layout
 
 _CONSTANT = 1 / 16
@@ -76,6 +76,7 @@ class ThresholdFeatures(Encoder):
         kinds: Sequence[Kind] | None = None,
     ) -> None:
         super().__init__()
+        require_negatable(vsa, type(self).__name__)
         self.vsa, self.sensors, self.bins = vsa, whole("sensors", sensors), whole("bins", bins)
         self.subset = None if subset is None else whole("subset", subset)
         self.kinds = _kinds(kinds, self.sensors, self.bins)

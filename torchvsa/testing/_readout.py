@@ -28,7 +28,8 @@ def _a_readout_unbinds_and_compares(vsa: VSA) -> None:
         readout = vsa.readout(program, items)
         assert_close(readout(conditions), cosines * norms(noisy)[..., None], rtol=1e-5, atol=1e-5)
         match, top = readout.match(conditions), cosines.float().topk(2)
-        assert_close(match.index, top.indices[..., 0])
+        clear = match.margin > 1e-5  # sparse items often score the same
+        assert_close(match.index[clear], top.indices[..., 0][clear])
         assert_close(match.similarity, top.values[..., 0], rtol=1e-5, atol=1e-6)
         assert_close(match.margin, top.values[..., 0] - top.values[..., 1], rtol=1e-5, atol=1e-6)
 

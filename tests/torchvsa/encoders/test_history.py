@@ -67,7 +67,7 @@ def test_conditions_are_what_the_formula_says() -> None:
 
 @pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
 def test_every_architecture_bundles_permuted_moments(name: str) -> None:
-    vsa = torchvsa.architecture(name, 200)
+    vsa = torchvsa.architecture_near(name, 200)
     plain = Sum(Level(vsa, 6), 2, seed=3)
     encode = History(plain, LAGS)
     readings, episodes, _ = recording(1)

@@ -5,6 +5,7 @@ from itertools import combinations
 import pytest
 import torch
 from readings import centres, rows, seeded
+from spaces import with_negatives
 from torch.testing import assert_close
 
 import torchvsa
@@ -25,6 +26,7 @@ def test_one_dimension_in_sixteen_is_constant() -> None:
     assert (~asking(encode)).float().mean() == pytest.approx(1 / 16, abs=0.012)
 
 
+@with_negatives
 def test_one_sensor_has_the_kernel_of_thermometer_codes(vsa: VSA) -> None:
     codes = ThresholdFeatures(vsa, 1, 11, seed=0)(centres(torch.arange(11)[:, None], 11))
     distances = (torch.arange(11)[:, None] - torch.arange(11)).abs()
@@ -60,6 +62,7 @@ def test_subsets_are_of_distinct_sensors_and_of_every_size() -> None:
     assert ThresholdFeatures(torchvsa.MAP(10), 2, 9, subset=5, seed=0).sensor.shape == (2, 10)
 
 
+@with_negatives
 def test_nothing_observed_is_the_start(vsa: VSA) -> None:
     encode = ThresholdFeatures(vsa, 3, 7, seed=0)
     assert torch.equal(encode(torch.full((1, 3), torch.nan))[0], encode.start_codes)
@@ -94,6 +97,7 @@ def test_even_edges_are_the_bins_without_edges() -> None:
     assert torch.equal(plan.take(given.state_dict())(x), plain(x))
 
 
+@with_negatives
 @pytest.mark.parametrize(("bins", "cosine"), [(2, -1), (3, -1 / 3), (4, -1 / 3), (5, -1 / 5), (6, -1 / 5)])
 def test_balanced_codes_are_as_far_apart_as_they_can_be(vsa: VSA, bins: int, cosine: float, chance: float) -> None:
     codes = Balanced(vsa, bins, seed=0).codes

@@ -7,6 +7,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from readings import centres, rows, seeded
+from spaces import with_negatives
 from torch.testing import assert_close
 
 import torchvsa
@@ -23,6 +24,7 @@ def similarities(vsa: VSA, kind: Any, count: int) -> torch.Tensor:
     return vsa.similarity(codes[:, None], codes)
 
 
+@with_negatives
 def test_an_angle_has_a_kernel_that_falls_linearly_round_the_circle(vsa: VSA) -> None:
     apart = (torch.arange(24)[:, None] - torch.arange(24)).abs()
     turns = torch.minimum(apart, 24 - apart) / 24
@@ -31,6 +33,7 @@ def test_an_angle_has_a_kernel_that_falls_linearly_round_the_circle(vsa: VSA) ->
     assert_close(similarities(vsa, "angle", 24), 1 - ASKING * 4 * turns, atol=0.1, rtol=0)
 
 
+@with_negatives
 @pytest.mark.parametrize(
     ("count", "kernel"), [(2, -1), (3, -1 / 3), (4, -1 / 3), (5, -1 / 5), (6, -1 / 5), (20, -1 / 19)]
 )

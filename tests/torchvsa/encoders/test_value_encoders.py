@@ -9,6 +9,7 @@ import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from readings import centres, seeded
+from spaces import with_negatives
 from torch import Tensor
 from torch.testing import assert_close
 
@@ -67,6 +68,7 @@ def test_exactly_the_due_elements_have_changed_over(dim: int, bins: int) -> None
         assert ((before == codes[0]) | (after == codes[-1])).all()
 
 
+@with_negatives
 def test_thermometer_codes_fall_linearly_to_their_opposite(vsa: VSA, chance: float) -> None:
     expected = 1 - 2 * distances(11) / 10
     # Elements of equal size count exactly; where sizes differ (HRR), those that are negated weigh more or less.
@@ -74,6 +76,7 @@ def test_thermometer_codes_fall_linearly_to_their_opposite(vsa: VSA, chance: flo
     assert_close(kernel(vsa, Thermometer(vsa, 11, 0).codes), expected, atol=atol + 1e-6, rtol=0)
 
 
+@with_negatives
 @pytest.mark.parametrize("bins", [2, 7, 12])
 def test_circular_codes_fall_with_the_shorter_way_round(vsa: VSA, chance: float, bins: int) -> None:
     apart = torch.minimum(distances(bins), bins - distances(bins)) / bins
@@ -87,6 +90,7 @@ def test_the_ends_of_a_circle_are_one() -> None:
     assert torch.equal(*encode(torch.tensor([0.0, 1.0])))
 
 
+@with_negatives
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_code_per_bin_from_the_seed_alone(vsa: VSA, kind: Any) -> None:
     for bins in (1, 2, 5):
