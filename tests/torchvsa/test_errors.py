@@ -68,6 +68,7 @@ REFUSED: dict[str, tuple[Callable[[], object], type[ValueError], list[str]]] = {
         ["weights", "3", "()"],
     ),
     "a sequence of elements": (lambda: SMALL.sequence(torch.ones(3, 16), dim=-1), ShapeError, ["dim=-1", "(3, 16)"]),
+    "a sequence of none": (lambda: SMALL.sequence(torch.ones(0, 16)), ShapeError, ["at least one", "none"]),
     "too long n-grams": (lambda: SMALL.ngrams(torch.ones(2, 16), 3), ShapeError, ["n = 3", "at least 3", "got 2"]),
     "n-grams of none": (lambda: SMALL.ngrams(torch.ones(2, 16), 0), ValueError, ["n is a positive integer", "0"]),
     "a role without a value": (

@@ -57,13 +57,17 @@ class Derived(ABC):
             raw: Whether the sum is returned as it is.
 
         Raises:
-            ShapeError: `dim` is the hypervector dimension.
+            ShapeError: `dim` is the hypervector dimension, or there are no hypervectors.
 
-        Source: Kanerva 2009, "Hyperdimensional computing", on sequences by permutation; for the sum, Joshi, Halseth
-        and Kanerva 2016, "Language geometry using random indexing".
+        Source: Sahlgren, Holst and Kanerva 2008, "Permutations as a means to encode order in word space"; Kanerva 2009,
+        "Hyperdimensional computing".
         """
-        xs = self._rows(xs, dim)
-        return self._joined(self.permute(xs, torch.arange(xs.shape[-2] - 1, -1, -1, device=xs.device)), raw)
+        members = self._rows(xs, dim).unbind(-2)
+        if not members:
+            raise ShapeError("a sequence has at least one hypervector; got none")
+        # One by one: in batches faster than with a tensor of shifts.
+        rotated = [self.permute(x, len(members) - 1 - i) for i, x in enumerate(members)]
+        return self._joined(torch.stack(rotated, -2), raw)
 
     def ngrams(self, xs: Summands, n: int = 3, dim: int = -2, *, raw: bool = False) -> Shaped[Tensor, "..."]:
         """The bundle of all n-grams of a sequence: of each `n` neighbours, bound to one another.
@@ -106,7 +110,7 @@ class Derived(ABC):
         Raises:
             ShapeError: `dim` is the hypervector dimension, or there are not as many roles as values.
 
-        Source: Plate 1995, "Holographic reduced representations"; Kanerva 2009.
+        Source: Plate 1995, "Holographic reduced representations"; Kanerva 2009, "Hyperdimensional computing".
         """
         roles, values = self._rows(roles, dim), self._rows(values, dim)
         if roles.shape[-2] != values.shape[-2]:
