@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import statistics
-import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
-import numpy as np
 import pandas as pd
 from rich.progress import Progress
 
@@ -23,6 +19,7 @@ from experiments.kit import Cell, Row
 from experiments.kit.store import write_frame
 from experiments.tasks import corral
 from experiments.tasks.agreement import compare
+from experiments.tasks.timing import query_seconds
 
 
 def prepare(settings: Corral, folder: Path, progress: Progress) -> Material:
@@ -123,16 +120,3 @@ def agreement(material: Material, controller: Controller, held_out: Demonstratio
         "ambiguous_share": None if program is None else ambiguous_share(program, material.moving, held_out),
         **{f"heldout_agreement.{rule}": share for rule, share in found.by_rule.items()},
     }
-
-
-def query_seconds(policy: sim.ControllerLike, readings: np.ndarray[Any, Any], calls: int = 200) -> float:
-    """Median time of one answer to one robot in the form that drives, over readings of the teacher's runs."""
-    rows = readings[np.linspace(0, len(readings) - 1, calls).astype(int)]
-    controller = sim.as_controller(corral.frozen(policy))
-    state = controller.start(np.zeros(1, dtype=np.int64))
-    times = []
-    for row in rows:
-        start = time.perf_counter()
-        _, state = controller.step(row[None], state)
-        times.append(time.perf_counter() - start)
-    return statistics.median(times)
