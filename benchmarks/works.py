@@ -5,6 +5,7 @@ from typing import Any
 
 from benchmarks import (
     cleanup,
+    digits,
     encoding,
     fit_times,
     growth,
@@ -27,10 +28,11 @@ WORKS = {
     "learning": learning,
     "recall": recall,
     "sparse": sparse,
+    "digits": digits,
     "rollouts": rollouts,
     "imports": imports,
 }
-KEPT = ("encoding", "protection", "random", "recall")
+KEPT = ("encoding", "protection", "random", "recall", "digits")
 """Works whose steps make tensors so large that it matters what becomes of their memory."""
 ON_THE_CPU = ("rollouts", "imports")
 """Works that no other device has a part in."""

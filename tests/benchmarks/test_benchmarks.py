@@ -53,7 +53,7 @@ def test_the_command_measures_every_work(
     works = {row["work"].split(",")[0] for row in compared}
     assert works == {
         "record encoding", "clean-up", "protect", "random hypervectors", "Algorithm 1", "Algorithm 2", "robot step",
-        "import beyond torch", "sparse codes",
+        "import beyond torch", "sparse codes", "digits",
     }  # fmt: skip
     for row in compared:
         assert set(row) >= COLUMNS
@@ -61,7 +61,7 @@ def test_the_command_measures_every_work(
         assert row["floor"] is None or row["of_floor"] == row["ours_s"] / row["floor_s"]
         assert row["work"] in printed or "…" in printed
     kept = {row["work"].split(",")[0] for row in compared if row["memory"] == "kept"}
-    assert kept == {"record encoding", "protect", "random hypervectors", "Algorithm 2"}
+    assert kept == {"record encoding", "protect", "random hypervectors", "Algorithm 2", "digits"}
     for row in rows:
         if "exponent" in row:
             slope = math.log(row["seconds"][1] / row["seconds"][0]) / math.log(row["sizes"][1] / row["sizes"][0])

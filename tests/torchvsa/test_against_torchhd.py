@@ -1,5 +1,7 @@
 """The same values as torch-hd, wherever it has the same operation."""
 
+from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
 import pytest
@@ -100,6 +102,68 @@ def test_similarity_of_bits_is_their_hamming_distance() -> None:
     assert_close(vsa.similarity(x[0][:, None], x[1]), 2 * agreeing / DIM - 1)
 
 
+@both
+def test_inverse(name: str) -> None:
+    vsa, x, peer = drawn(name, 5)
+    assert torch.equal(vsa.inverse(x), plain(torchhd.inverse(peer)))
+
+
+def bound_sequence(x: Any) -> Any:
+    if not isinstance(x, torchhd.HRRTensor):
+        return torchhd.bind_sequence(x)
+    # torch-hd's `multibind` drops the imaginary parts of the spectrum, which gives another vector.
+    members: list[Any] = list(x.movedim(1, 0))
+    return reduce(torchhd.bind, [torchhd.permute(member, shifts=6 - i) for i, member in enumerate(members)])
+
+
+JOINED: dict[str, tuple[Callable[..., Tensor], Callable[..., Any]]] = {
+    "sequence": (lambda vsa, x, raw: vsa.sequence(x[0], raw=raw), lambda x: torchhd.bundle_sequence(x[0])),
+    "3-grams": (lambda vsa, x, raw: vsa.ngrams(x[0], raw=raw), lambda x: torchhd.ngrams(x[0])),
+    "5-grams": (lambda vsa, x, raw: vsa.ngrams(x[0], 5, raw=raw), lambda x: torchhd.ngrams(x[0], 5)),
+    "bound sequence": (lambda vsa, x, raw: vsa.ngrams(x[0], 7, raw=raw), lambda x: bound_sequence(x[0])),
+    "record": (lambda vsa, x, raw: vsa.record(x[0], x[1], raw=raw), lambda x: torchhd.hash_table(x[0], x[1])),
+    "graph": (
+        lambda vsa, x, raw: vsa.record(vsa.permute(x[1], 1), x[0], raw=raw),
+        lambda x: torchhd.graph(x.movedim(0, -3), directed=True),
+    ),
+}
+
+
+@both
+@pytest.mark.parametrize("structure", JOINED)
+def test_structures(name: str, structure: str) -> None:
+    # Seven members, so that each structure sums an odd number: torch-hd draws the ties of bits at random.
+    vsa, x, peer = drawn(name, 2, 4, 7)
+    ours, theirs = JOINED[structure]
+    raw, expected = ours(vsa, x, raw=True), plain(theirs(peer))
+    if name == "BSC":
+        assert torch.equal(ours(vsa, x, raw=False), expected)
+        raw = vsa.normalize(raw)
+    assert_close(raw, expected, rtol=1e-4, atol=1e-5)
+
+
+@both
+def test_dot_and_hamming_similarity(name: str) -> None:
+    vsa, x, peer = drawn(name, 2, 5)
+    half = torch.cat([x[0, :, : DIM // 2], x[1, :, DIM // 2 :]], -1)
+    theirs: Any = torchhd.ensure_vsa_tensor(half.clone(), PEERS[name])  # pyright: ignore[reportArgumentType]
+    products, equal = (torchhd.dot_similarity(theirs, peer[0]), torchhd.hamming_similarity(theirs, peer[0]))
+    ours = vsa.dot_similarity(half[:, None], x[0])
+    assert_close(ours.to(torch.float32), plain(products).to(torch.float32), rtol=1e-5, atol=1e-4)
+    assert torch.equal(vsa.hamming_similarity(half[:, None], x[0]), plain(equal))
+
+
+@pytest.mark.parametrize("name", ["HRR", "FHRR"])
+def test_powers_are_the_points_of_a_fractional_power_encoding(name: str) -> None:
+    vsa = torchvsa.architecture(name, DIM)
+    torch.manual_seed(0)
+    encode = torchhd.embeddings.FractionalPower(1, DIM, vsa=name)  # pyright: ignore[reportArgumentType]
+    base = plain(encode.basis())[0].detach()
+    for value in (0.0, 0.3, -1.7, 2.0):
+        expected = plain(encode(torch.tensor([[value]])))[0].detach()
+        assert_close(vsa.power(base, value), expected, rtol=1e-4, atol=1e-4)
+
+
 def test_vtb_multiplies_by_the_same_matrices() -> None:
     vsa = torchvsa.VTB(900)
     x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
@@ -140,3 +204,30 @@ def test_sparse_block_codes_add_the_same_places() -> None:
     # Codes of the same blocks: torch-hd counts equal places, a cosine divides them by the number of blocks.
     equal = (places(x[0])[:, None] == places(x[1])).double().sum(-1)
     assert_close(vsa.similarity(x[0][:, None], x[1]).double(), equal / vsa.blocks)
+
+
+def test_what_is_made_of_the_operations_of_vtb() -> None:
+    vsa = torchvsa.VTB(900)
+    x = vsa.random(2, 4, 7, generator=torch.Generator().manual_seed(0))
+    peer: Any = torchhd.ensure_vsa_tensor(x.clone(), "VTB")
+    assert_close(vsa.sequence(x[0], raw=True), plain(torchhd.bundle_sequence(peer[0])))
+    assert_close(vsa.ngrams(x[0], raw=True), plain(torchhd.ngrams(peer[0])), rtol=1e-4, atol=1e-5)
+    assert_close(vsa.ngrams(x[0], 7, raw=True), plain(torchhd.bind_sequence(peer[0])), rtol=1e-4, atol=1e-5)
+    # torch-hd's table takes the values for the keys, with which its own `get` does not unbind.
+    assert_close(vsa.record(x[0], x[1], raw=True), plain(torchhd.hash_table(peer[1], peer[0])))
+    assert torch.equal(vsa.inverse(x), plain(torchhd.inverse(peer)))
+
+
+def test_what_is_made_of_the_operations_of_mcr() -> None:
+    vsa = torchvsa.MCR(DIM)
+    x = vsa.random(2, 5, generator=torch.Generator().manual_seed(0))
+    peer: Any = vsa.numbers(x).long().as_subclass(torchhd.MCRTensor)
+    peer.block_size = 16
+    assert torch.equal(vsa.numbers(vsa.inverse(x)).long(), plain(torchhd.inverse(peer)))
+    assert torch.equal(vsa.numbers(vsa.ngrams(x[0], 5)).long(), plain(torchhd.bind_sequence(peer[0])))
+    assert torch.equal(vsa.numbers(vsa.power(x, -3)).long(), (-3 * plain(peer)) % 16)
+    bound = vsa.bind(x[0], x[1])
+    theirs: Any = torchhd.bind(peer[0], peer[1])
+    equal = plain(torchhd.hamming_similarity(theirs, peer[0]))
+    assert torch.equal(vsa.hamming_similarity(bound[:, None], x[0]), equal)
+    assert (vsa.hamming_similarity(vsa.unbind(bound, x[1]), x[0]) == DIM).all()

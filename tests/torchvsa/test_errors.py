@@ -67,6 +67,17 @@ REFUSED: dict[str, tuple[Callable[[], object], type[ValueError], list[str]]] = {
         ShapeError,
         ["weights", "3", "()"],
     ),
+    "a sequence of elements": (lambda: SMALL.sequence(torch.ones(3, 16), dim=-1), ShapeError, ["dim=-1", "(3, 16)"]),
+    "a sequence of none": (lambda: SMALL.sequence(torch.ones(0, 16)), ShapeError, ["at least one", "none"]),
+    "too long n-grams": (lambda: SMALL.ngrams(torch.ones(2, 16), 3), ShapeError, ["n = 3", "at least 3", "got 2"]),
+    "n-grams of none": (lambda: SMALL.ngrams(torch.ones(2, 16), 0), ValueError, ["n is a positive integer", "0"]),
+    "a role without a value": (
+        lambda: SMALL.record(torch.ones(3, 16), torch.ones(2, 16)),
+        ShapeError,
+        ["3 roles", "2 values"],
+    ),
+    "half a power of MAP": (lambda: SMALL.power(torch.ones(16), 0.5), ValueError, ["MAP-C", "FHRR or HRR", "0.5"]),
+    "an endless power": (lambda: torchvsa.HRR(8).power(torch.ones(8), float("inf")), ValueError, ["real", "inf"]),
     "an unknown width": (
         lambda: SelfShift(SMALL, "median"),  # pyright: ignore[reportArgumentType]
         ValueError,
@@ -169,7 +180,7 @@ def test_the_message_names_what_was_given_and_what_was_expected(name: str) -> No
         assert word in str(refused.value)
 
 
-@pytest.mark.parametrize("verb", ["bind", "unbind", "similarity"])
+@pytest.mark.parametrize("verb", ["bind", "unbind", "similarity", "dot_similarity", "hamming_similarity"])
 @pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
 def test_no_architecture_takes_vectors_of_another_dimension(name: str, verb: str) -> None:
     vsa, other = torchvsa.architecture(name, 16), torchvsa.architecture_near(name, 8)
@@ -183,6 +194,7 @@ def test_no_architecture_takes_vectors_of_another_dimension(name: str, verb: str
 @pytest.mark.parametrize("name", torchvsa.ARCHITECTURES)
 def test_no_permutation_or_protection_takes_vectors_of_another_dimension(name: str) -> None:
     vsa, wrong = torchvsa.architecture(name, 16), torchvsa.architecture_near(name, 8).random(2)
-    for call in (lambda: vsa.permute(wrong, 1), lambda: SelfShift(vsa, seed=0)(wrong)):
+    calls = (lambda: vsa.permute(wrong, 1), lambda: SelfShift(vsa, seed=0)(wrong), lambda: vsa.power(wrong, 2))
+    for call in calls:
         with pytest.raises(ShapeError, match=rf"x must end in d = 16 elements; got shape \(2, {wrong.shape[1]}\)"):
             call()

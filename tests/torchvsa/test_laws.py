@@ -81,3 +81,13 @@ def test_rows_drawn_one_by_one_are_the_rows_drawn_at_once(name: str, dim: int) -
     at_once = vsa.random(2, 3, generator=together)
     one_by_one = torch.stack([vsa.random(generator=single) for _ in range(6)])
     assert torch.equal(at_once.reshape(6, dim), one_by_one)
+
+
+def test_ngrams_tell_the_order_of_their_members(vsa: VSA, draw: Draw, chance: float) -> None:
+    a, b, c = draw(3)
+    orders = torch.stack([vsa.ngrams(xs) for xs in ([a, b, c], [b, a, c], [a, c, b], [c, b, a])])
+    # As the docstring says, a rotation commutes with HRR's convolution, and the rotations of BSDC-S with one another.
+    confused = {"HRR": [0, 1, 2, 3], "BSDC-S": [0, 2]}.get(vsa.name, [0])
+    similarity = vsa.similarity(orders[0], orders)
+    assert_close(similarity[confused], torch.ones(len(confused)))
+    assert all(similarity[i].abs() < chance for i in range(4) if i not in confused)

@@ -40,9 +40,25 @@ class Boastful(HRR):
         self.self_inverse = True
 
 
+class Backwards(MAP):
+    """Rotates the first of a sequence least."""
+
+    def sequence(self, xs: Any, dim: int = -2, *, raw: bool = False) -> Tensor:
+        return super().sequence(xs.flip(dim), dim, raw=raw)
+
+
+class Doubtful(HRR):
+    """Takes a hypervector for its own inverse."""
+
+    def inverse(self, x: Tensor) -> Tensor:
+        return x
+
+
 @pytest.mark.parametrize(
     ("vsa", "law"),
     [
+        (Backwards(500), "a sequence bundles rotated members"),
+        (Doubtful(500), "binding with the inverse unbinds"),
         (Leaky(500), "unbind undoes bind"),
         (Asymmetric(500), "bind commutes and associates"),
         (Boastful(500), "unbind undoes bind"),

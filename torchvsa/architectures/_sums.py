@@ -11,6 +11,9 @@ from torchvsa._checks import INT32_MAX, INTEGERS, fits, largest, narrowed, reada
 from torchvsa._numerics import as_bipolar, is_integer
 from torchvsa.errors import ShapeError
 
+Summands = Shaped[Tensor, "..."] | Sequence[Shaped[Tensor, "..."]]
+"""Hypervectors to bundle: stacked in one tensor, or in a list or tuple."""
+
 
 def stacked(xs: Any, dim: Any) -> tuple[Shaped[Tensor, "..."], int]:
     """The summands as one tensor (a list or tuple is stacked on dimension -2), and the dimension to sum over."""

@@ -1,7 +1,7 @@
 """The interface of Vector Symbolic Architectures, and what all of them share."""
 
 import math
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -13,16 +13,15 @@ from torchvsa._checks import INTEGERS, nearest, whole_number
 from torchvsa._kernels.rotation import rotate
 from torchvsa._memory_limit import require_memory
 from torchvsa._numerics import as_bipolar, cosines, is_integer, norms
-from torchvsa.architectures._sums import check_weights, integer_sum, stacked, weighted
+from torchvsa.architectures._derived import Derived
+from torchvsa.architectures._sums import Summands, check_weights, integer_sum, weighted
 from torchvsa.errors import ShapeError
 from torchvsa.readout import Readout
 
-Summands = Shaped[Tensor, "..."] | Sequence[Shaped[Tensor, "..."]]
-"""Hypervectors to bundle: stacked in one tensor, or in a list or tuple."""
 _DIM = "dim is the number of elements of a hypervector, a positive integer"
 
 
-class VSA(ABC):
+class VSA(Derived):
     """A space of hypervectors of `dim` numbers, and the operations on them.
 
     Hypervectors are plain tensors `[..., d]`; leading dimensions are batches. A **raw accumulator** is what
@@ -30,9 +29,9 @@ class VSA(ABC):
     accept it in place of a hypervector, which keeps them linear; `normalize` turns it into a hypervector.
 
     A new architecture implements `random`, `identity`, `_bind`, `_unbind` (not needed if `_bind` undoes itself) and
-    `normalize`. It sets `name` and every attribute below that differs, overrides `allows_dim` if not every `dim` works,
-    and is registered in `torchvsa.ARCHITECTURES`. `bind` and `unbind` check shapes and then call `_bind` and `_unbind`;
-    an architecture that needs other checks overrides the public methods instead.
+    `normalize`. It sets `name` and every attribute below that differs, overrides `allows_dim` if not every `dim` works
+    and `inverse` if there is one, and is registered in `torchvsa.ARCHITECTURES`. `bind` and `unbind` check shapes and
+    then call `_bind` and `_unbind`; an architecture that needs other checks overrides the public methods instead.
     """
 
     name: str
@@ -155,13 +154,6 @@ class VSA(ABC):
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Turn a raw accumulator into a hypervector of this architecture."""
 
-    def negative(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
-        """The hypervector whose similarity to `x` is -1. Raises `ValueError` unless the architecture is `negatable`."""
-        if not self.negatable:
-            raise ValueError(f"{self.name} has no negative hypervectors")
-        self.check(x, "x")
-        return ~x if x.dtype == torch.bool else -x
-
     @property
     def frequencies(self) -> int | None:
         """The number of angles that `from_angles` takes; None for an architecture without a spectrum."""
@@ -212,13 +204,7 @@ class VSA(ABC):
                 elsewhere a sum of int8 codes fits if `k` times the largest absolute weight is below 2^24, and a sum
                 that does not fit wraps around.
         """
-        xs, dim = stacked(xs, dim)
-        self.check(xs, "xs")
-        if xs.dim() < 2 or dim in (-1, xs.dim() - 1):
-            raise ShapeError(
-                f"bundling sums over a dimension other than the last; got shape {tuple(xs.shape)} and "
-                f"dim={dim}, expected e.g. [..., k, {self.dim}] and dim=-2"
-            )
+        xs, dim = self._stacked(xs, dim)
         votes = as_bipolar(xs)
         if weights is not None:
             check_weights(weights, votes, xs.shape[dim])

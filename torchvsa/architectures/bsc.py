@@ -7,9 +7,9 @@ from torch import Tensor
 from torchvsa._checks import refuse_nan
 from torchvsa._numerics import as_bipolar, norms
 from torchvsa.architectures._random import random_bits
-from torchvsa.architectures._sums import multiplied, stacked
+from torchvsa.architectures._sums import Summands, multiplied, stacked
 from torchvsa.architectures._ties import tie_voters
-from torchvsa.architectures.base import VSA, Summands
+from torchvsa.architectures.base import VSA
 
 
 class BSC(VSA):

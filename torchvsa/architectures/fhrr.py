@@ -48,6 +48,14 @@ class FHRR(VSA):
     def _unbind(self, bound: Tensor, key: Tensor) -> Tensor:
         return bound * key.conj()
 
+    def inverse(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """The complex conjugate: every angle is negated."""
+        self.check(x, "x")
+        return torch.conj_physical(x)
+
+    def _power(self, x: Tensor, n: float) -> Tensor:
+        return torch.polar(x.abs() ** abs(n), x.angle() * n)
+
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Scale every element to magnitude 1; zero stays zero."""
         return safe_divide(raw, raw.abs())

@@ -38,6 +38,17 @@ class HRR(NormalElements):
         spectrum = torch.fft.rfft(b)
         return torch.fft.irfft(torch.fft.rfft(a) * (spectrum.conj() if conjugate else spectrum), n=self.dim)
 
+    def inverse(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """The involution, element -i modulo d at index i: the spectrum's angles are negated, its magnitudes kept."""
+        self.check(x, "x")
+        return x.flip(-1).roll(1, -1)
+
+    def _power(self, x: Tensor, n: float) -> Tensor:
+        if x.numel() == 0:
+            return x
+        spectrum = torch.fft.rfft(x)
+        return torch.fft.irfft(torch.polar(spectrum.abs() ** abs(n), spectrum.angle() * n), n=self.dim)
+
     @property
     def frequencies(self) -> int:
         """The frequencies strictly between 0 and d / 2, whose angles are free in a real vector."""

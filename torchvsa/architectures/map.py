@@ -9,9 +9,9 @@ from torch import Tensor
 from torchvsa._checks import narrowed, refuse_nan
 from torchvsa._numerics import inner_products, is_integer, safe_sqrt, units, widened
 from torchvsa.architectures._random import random_bits
-from torchvsa.architectures._sums import multiplied, stacked
+from torchvsa.architectures._sums import Summands, multiplied, stacked
 from torchvsa.architectures._ties import tie_voters
-from torchvsa.architectures.base import VSA, Summands
+from torchvsa.architectures.base import VSA
 
 
 class MAP(VSA):
@@ -82,6 +82,11 @@ class MAP(VSA):
 
     def _bind(self, a: Tensor, b: Tensor) -> Tensor:
         return multiplied(a, b)
+
+    def inverse(self, x: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
+        """The hypervector itself, with uniform atoms too: unbind is bind."""
+        self.check(x, "x")
+        return x
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """C: clip to [-1, 1], keeping 0; for int8, round to the nearest element. I: the sum itself. B: the sign.

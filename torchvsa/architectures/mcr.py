@@ -3,7 +3,7 @@
 import math
 
 import torch
-from jaxtyping import Float, Shaped
+from jaxtyping import Float, Int64, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
@@ -48,6 +48,12 @@ class MCR(FHRR):
         turns = torch.where(x == 0, 0.0, x.angle()) * (self.modulus / (2 * math.pi))
         # The sum of two neighbours is halfway between them, up to rounding.
         return ((turns + (0.5 - _HALFWAY)).floor().to(torch.int64) % self.modulus).to(torch.uint8)
+
+    def hamming_similarity(
+        self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]
+    ) -> Int64[Tensor, "*#batch"]:
+        """How many `numbers` of `a` and `b` are equal: products of complex numbers are rounded."""
+        return super().hamming_similarity(self.numbers(a), self.numbers(b))
 
     def normalize(self, raw: Shaped[Tensor, "*batch d"]) -> Shaped[Tensor, "*batch d"]:
         """Round the angle of every element to the nearest sixteenth of a turn; zero stays zero."""

@@ -8,6 +8,7 @@ from torch.testing import assert_close
 
 from torchvsa.architectures import ARCHITECTURES, VSA, architecture
 from torchvsa.errors import ShapeError
+from torchvsa.testing._derived import DERIVED_LAWS
 from torchvsa.testing._laws import check, draw, refuses, require, same, seeded
 from torchvsa.testing._readout import READOUT_LAWS
 
@@ -266,5 +267,6 @@ _LAWS: tuple[Callable[[VSA], None], ...] = (
     _angles_add_up_under_binding,
     _a_dim_that_is_not_allowed_is_refused,
     _it_is_made_again_from_its_config,
+    *DERIVED_LAWS,
     *READOUT_LAWS,
 )
