@@ -44,7 +44,7 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("controllers=[]", "controllers is empty; choose from teacher, default"),
         ("vsa.name=MAP-X", "'MAP-X'"),
         ("vsa.dim=0", "dim"),
-        ("vsa.dim=8", "no weights of the five rules"),
+        ("vsa.dim=8", "no weights of the 5 rules"),
         ("vsa=hrr rule=least_squares", "the rule least_squares cannot train programs of HRR"),
         ("vsa=hrr rule@paper.rule=least_squares", "the rule least_squares cannot train programs of HRR"),
         ("paper.rule=least_squares", "paper.rule=least_squares: to choose an option, write rule@paper.rule="),
