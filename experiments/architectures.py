@@ -5,6 +5,7 @@ same rule, and drives from the same starts.
 
     torchvsa architectures
     torchvsa architectures architectures=[MAP-C,VTB] dim=1024 starts=100
+    torchvsa architectures architectures=[HRR,FHRR] encoders=[fractional_power] demonstrations=5 rule.epochs=20
 """
 
 import itertools
@@ -43,7 +44,7 @@ class Architectures(corral.Driving):
     )
     dim: int = setting(4000, "elements of a hypervector; an architecture takes the nearest number it allows", low=4)
     encoders: list[str] = setting(
-        ["level", "lookup", "thermometer", "fractional_power"], "codes of one reading, in each record",
+        ["level", "lookup", "thermometer"], "codes of one reading, in each record",
         choices=lambda: VALUE_ENCODERS, distinct=True,
     )  # fmt: skip
     records: list[str] = setting(
@@ -52,7 +53,7 @@ class Architectures(corral.Driving):
     bins: int = setting(32, "bins of each sensor; level codes span a quarter of them", low=4)
     protection: Part = part("protection", "none", "what is done to a condition before it is bound")
     rule: Part = part("rule", "error_driven", "how a program is learned")
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    demonstrations: int = setting(20, "episodes of the teacher to learn from", low=1)
     starts: int = setting(200, "held-out starts", low=1)
     repeats: int = setting(2, "draws of the codebooks", low=1)
 

@@ -19,7 +19,7 @@ def test_what_is_not_supported_is_left_out_with_the_reason() -> None:
     assert ("BSDC-S", "threshold_features") not in found
     assert "negate" in architectures.refusal(settings, "BSDC-S", "threshold_features")
     assert "element-wise" in architectures.refusal(settings, "VTB", "subset_product of level")
-    assert ("FHRR", "product of fractional_power") in found
+    assert ("FHRR", "subset_product of thermometer") in found
     assert architectures.refusal(settings, "FHRR", "product of fractional_power") == ""
     for name, encoder in found:
         assert encoder in architectures.conditions(settings), name
