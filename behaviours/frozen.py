@@ -16,7 +16,8 @@ from behaviours.recall import Recall, answer_cells
 from behaviours.space import Space
 from torchvsa import Readout
 from torchvsa._numerics import as_bipolar, in_units, norms, real_parts
-from torchvsa._rows import Row, noise, real, row_encoder
+from torchvsa._row_verbs import Row, noise, real
+from torchvsa._rows import row_encoder
 
 
 class FrozenBehaviour(Controller):

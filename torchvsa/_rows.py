@@ -8,30 +8,14 @@ Parts are looked up by their exact class. A subclass may behave differently, and
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from torchvsa.architectures import BSC, FHRR, HRR, MAP, VSA
+from torchvsa._row_verbs import Array, Row, Verbs, rolled, verbs
 from torchvsa.encoders import Encoder, Mirrored, Product, SubsetProduct, Sum, ThresholdFeatures
 from torchvsa.encoders.base import ROUNDING, Binned
 from torchvsa.protection import FixedShift, Protection, SelfShift, Unprotected
-
-Array = NDArray[Any]
-Row = Callable[[Array], Array]
-
-
-class Verbs(NamedTuple):
-    """The operations of an architecture on rows `[k, d]`."""
-
-    bind: Row
-    bundle: Row
-    noise: Callable[[Array], Callable[[Array, Array], float]] | None = None
-    """Maps a program to a function of a key and its squares (see `real`) that returns `|unbind(program, key)|²`.
-
-    None if that is the product of the squares, as for element-wise binding.
-    """
 
 
 def row_encoder(encoder: Encoder, protection: Protection) -> Row | None:
@@ -49,92 +33,6 @@ def row_encoder(encoder: Encoder, protection: Protection) -> Row | None:
     return None if encode is None else lambda x: protect(encode(x))
 
 
-def real(code: Array) -> Array:
-    """A hypervector in float64 with the same products: bits as -1 / +1, complex elements as pairs."""
-    if code.dtype == np.bool_:
-        return 1.0 - 2.0 * code
-    return (code.view(np.real(code).dtype) if np.iscomplexobj(code) else code).astype(np.float64)
-
-
-def verbs(vsa: VSA) -> Verbs | None:
-    """The NumPy operations of an architecture; None if it has none."""
-    return _VERBS[type(vsa)](vsa) if type(vsa) in _VERBS else None
-
-
-def noise(vsa: VSA, program: Array) -> Callable[[Array, Array], float]:
-    """A function of a key in the form of `real` and its squares that returns `|unbind(program, key)|²`."""
-    known = verbs(vsa)
-    if known is not None and known.noise is not None:
-        return known.noise(program)
-    sizes = np.abs(program).repeat(2) if np.iscomplexobj(program) else real(program)
-    weights = sizes.astype(np.float64) ** 2
-    return lambda _, squares: float(squares @ weights)
-
-
-def _product(rows: Array) -> Array:
-    return np.multiply.reduce(rows, 0, dtype=rows.dtype)
-
-
-def _sum(rows: Array) -> Array:
-    # Integer codes are -1, 0 and +1.
-    return np.add.reduce(rows, 0, dtype=np.int32 if rows.dtype == np.int8 and len(rows) > 127 else rows.dtype)
-
-
-def _map(vsa: Any) -> Verbs:
-    def clipped(rows: Array) -> Array:
-        total = _sum(rows)
-        # For integers the sign equals the clipped value, and is far faster.
-        return np.sign(total).astype(rows.dtype, copy=False) if vsa.integer else total.clip(-1, 1)
-
-    def majority(rows: Array) -> Array:
-        total = np.sign(_sum(rows))
-        return np.where(total == 0, _rolled(rows[0] * rows[min(1, len(rows) - 1)], 1), total).astype(rows.dtype)
-
-    def summed(rows: Array) -> Array:
-        return np.add.reduce(rows, 0, dtype=np.int32 if vsa.integer else rows.dtype)
-
-    return Verbs(_product, {"C": clipped, "I": summed, "B": majority}[vsa.variant])
-
-
-def _bsc(_: VSA) -> Verbs:
-    def majority(rows: Array) -> Array:
-        ones = 2 * np.add.reduce(rows, 0, dtype=np.int32)
-        return np.where(ones == len(rows), _rolled(rows[0] ^ rows[min(1, len(rows) - 1)], 1), ones > len(rows))
-
-    return Verbs(lambda rows: np.logical_xor.reduce(rows, 0), majority)
-
-
-def _fhrr(_: VSA) -> Verbs:
-    def unit(rows: Array) -> Array:
-        raw = _sum(rows)
-        size = np.abs(raw)
-        return np.divide(raw, size, out=np.zeros_like(raw), where=size > 0)
-
-    return Verbs(_product, unit)
-
-
-def _hrr(vsa: VSA) -> Verbs:
-    def convolved(rows: Array) -> Array:
-        return np.fft.irfft(_product(np.fft.rfft(rows)), vsa.dim).astype(rows.dtype)
-
-    def unit(rows: Array) -> Array:
-        raw = _sum(rows)
-        return raw / (np.linalg.norm(raw) or 1)
-
-    def noise(program: Array) -> Callable[[Array, Array], float]:
-        # Parseval's theorem; every frequency of a real vector counts twice, except the first and, for even d, the last.
-        power = np.abs(np.fft.rfft(program)) ** 2 * 2 / vsa.dim
-        power[0] /= 2
-        if vsa.dim % 2 == 0:
-            power[-1] /= 2
-        return lambda key, _: float(power @ np.abs(np.fft.rfft(key)) ** 2)
-
-    return Verbs(convolved, unit, noise)
-
-
-_VERBS: dict[type, Callable[[Any], Verbs]] = {MAP: _map, BSC: _bsc, FHRR: _fhrr, HRR: _hrr}
-
-
 def _binned(bins: Any) -> Row:
     """`torchvsa.encoders.base.binned` for `bins` per reading, as floats; NaN stays NaN."""
     scale, last = bins * (1 + ROUNDING), bins - 1
@@ -147,11 +45,15 @@ def _record(encoder: Any, join: Row) -> Row | None:
         return None
     table, sensors = encoder.table.numpy(), np.arange(encoder.sensors)
     binned = _binned(np.array([value.bins for value in values], dtype=np.float64))
+    # An identity on the right only must stay in its place.
+    in_order, absent = isinstance(encoder, Product) and not encoder.vsa.commutative, table.shape[1] - 1
 
     def encode(x: Array) -> Array:
         cells, observed = binned(x), ~np.isnan(x)
         if observed.all():
             return join(table[sensors, cells.astype(np.int64)])
+        if in_order:
+            return join(table[sensors, np.where(observed, cells, absent).astype(np.int64)])
         return join(table[sensors[observed], cells[observed].astype(np.int64)])
 
     return encode
@@ -194,13 +96,9 @@ _ENCODERS: dict[type, Callable[[Any, Verbs], Row | None]] = {
 }
 
 
-def _rolled(x: Array, shift: int) -> Array:
-    return np.concatenate((x[-shift:], x[:-shift])) if shift else x
-
-
 def _fixed(protection: Any, _: Verbs) -> Row:
     shift = protection.shift % protection.vsa.dim
-    return lambda x: _rolled(x, shift)
+    return lambda x: rolled(x, shift)
 
 
 def _self_shift(protection: Any, known: Verbs) -> Row:
@@ -213,7 +111,7 @@ def _self_shift(protection: Any, known: Verbs) -> Row:
         count, total = len(positions), int(positions.sum())
         width = total % dim if protection.width_rule == "sum" else (2 * total + count) // max(2 * count, 1)
         pair[0] = x
-        return _rolled(bundle(pair), width)
+        return rolled(bundle(pair), width)
 
     return protect
 

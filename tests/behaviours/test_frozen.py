@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 import torch
-from robots import KINDS, random_pairs, same_bits, space
+from robots import random_pairs, same_bits, space
 from torch.testing import assert_close
 
 from behaviours import Controller, ErrorDriven, OneShot, Recall
 from behaviours.testing._controllers import CONTROLLER_LAWS
-from torchvsa import architecture_near
+from torchvsa import ARCHITECTURES, architecture_near
 
 READINGS = [*random_pairs(20).sensors.tolist(), [math.nan, 3.3, 19.0], [math.nan] * 3]
 
@@ -24,7 +24,7 @@ def same(a: Recall, b: Recall) -> bool:
 
 @pytest.mark.parametrize("protection", ["self_shift", "fixed_shift", "none"])
 @pytest.mark.parametrize("combine", ["sum", "product", "subset_product", "threshold_features"])
-@pytest.mark.parametrize("vsa", KINDS)
+@pytest.mark.parametrize("vsa", ARCHITECTURES)
 def test_a_frozen_behaviour_answers_as_its_behaviour(vsa: str, combine: str, protection: str) -> None:
     algebra = architecture_near(vsa, 200)
     if not (algebra.elementwise or combine != "subset_product") or not (

@@ -3,7 +3,7 @@
 import math
 
 import torch
-from jaxtyping import Float, Int64, Shaped
+from jaxtyping import Bool, Float, Int64, Shaped
 from torch import Tensor
 
 from torchvsa.architectures.base import VSA
@@ -47,7 +47,7 @@ class MCR(FHRR):
         self.check(x, "x")
         turns = torch.where(x == 0, 0.0, x.angle()) * (self.modulus / (2 * math.pi))
         # The sum of two neighbours is halfway between them, up to rounding.
-        return ((turns + (0.5 - _HALFWAY)).floor().to(torch.int64) % self.modulus).to(torch.uint8)
+        return ((turns + (0.5 - HALFWAY)).floor().to(torch.int64) % self.modulus).to(torch.uint8)
 
     def hamming_similarity(
         self, a: Shaped[Tensor, "*#batch d"], b: Shaped[Tensor, "*#batch d"]
@@ -61,7 +61,7 @@ class MCR(FHRR):
         nearest = self._roots(raw.device)[self.numbers(raw).to(torch.int64)]
         sizes = raw.abs()
         # What is left of numbers that cancel is rounding.
-        return torch.where(sizes <= 1e-5 * sizes.amax(-1, keepdim=True), 0.0, nearest).to(self.dtype)
+        return torch.where(sizes <= CANCELLED * sizes.amax(-1, keepdim=True), 0.0, nearest).to(self.dtype)
 
     @property
     def frequencies(self) -> None:
@@ -72,6 +72,11 @@ class MCR(FHRR):
         """Raises `ValueError`, since most angles are not among the 16."""
         return VSA.from_angles(self, angles)
 
+    def positive(self, x: Shaped[Tensor, "*batch d"]) -> Bool[Tensor, "*batch d"]:
+        """Which elements are less than a quarter of a turn from 0: 13, 14, 15, 0, 1, 2 and 3."""
+        quarter = self.modulus // 4
+        return ((self.numbers(x).to(torch.int64) + quarter - 1) % self.modulus < 2 * quarter - 1) & (x != 0)
+
     def unbundle(
         self, bundled: Shaped[Tensor, "*#batch d"], known: Shaped[Tensor, "*#batch d"]
     ) -> Shaped[Tensor, "*#batch d"]:
@@ -79,8 +84,9 @@ class MCR(FHRR):
         return self.normalize(super().unbundle(bundled, known))
 
     def _roots(self, device: torch.device) -> Shaped[Tensor, "modulus"]:
-        angles = torch.arange(self.modulus // 2, dtype=torch.float64, device=device) * (2 * math.pi / self.modulus)
-        half = torch.polar(torch.ones_like(angles), angles).to(self.dtype)
+        angles = torch.arange(self.modulus // 4, dtype=torch.float64, device=device) * (2 * math.pi / self.modulus)
+        quarter = torch.polar(torch.ones_like(angles), angles).to(self.dtype)
+        half = torch.cat([quarter, torch.complex(-quarter.imag, quarter.real)])
         # Opposite numbers have exactly opposite elements, so that their sum is 0.
         return torch.cat([half, -half])
 
@@ -88,5 +94,7 @@ class MCR(FHRR):
         return bool(((x - self._roots(x.device)[self.numbers(x).to(torch.int64)]).abs() < 1e-3).all())
 
 
-_HALFWAY = 1e-4
+HALFWAY = 1e-4
 """How near to the middle between two numbers an angle counts as halfway, in steps; sums in float32 round to 1e-6."""
+CANCELLED = 1e-5
+"""The share of a vector's largest element below which an element is what rounding left of numbers that cancel."""
