@@ -77,7 +77,7 @@ def main() -> None:
     for combination in track(every(), "combinations"):
         with tempfile.TemporaryDirectory() as folder:
             try:
-                refused += bool(drive(combination, Path(folder)))
+                refused += bool(drive(combination, Path(folder, "run")))
             except Exception as error:  # all of them are listed at the end
                 failed.append(f"{combination}: {type(error).__name__}: {error}")
     print(f"{len(every())} combinations: {refused} refused, {len(failed)} failed", *failed, sep="\n")
