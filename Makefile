@@ -1,4 +1,5 @@
 # `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs;
+# `make docs` builds the site in docs/_build/html;
 # `make bench` measures speed compared with peers; `make fuzz` loads 200,000 damaged files; `make combinations` drives
 # every rule x architecture x protection x record.
 PYTHON ?= python3.11
@@ -6,13 +7,16 @@ VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: run test lint bench combinations fuzz
+.PHONY: run test lint docs bench combinations fuzz
 
 run: $(INSTALLED)
 	$(BIN)/python -m experiments corral
 
 test: $(INSTALLED) lint
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal
+
+docs: $(INSTALLED)
+	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks

@@ -42,7 +42,7 @@ class ThresholdFeatures(Encoder):
 
     | kind | comparison | kernel |
     |---|---|---|
-    | `"real"` | Is the reading above a threshold? | 1 - 2·|difference| |
+    | `"real"` | Is the reading above a threshold? | 1 - 2·δ, with δ the difference |
     | `"angle"` | Is it in the half circle that begins at an angle? | 1 - 4·δ, with δ the distance in turns |
     | a number c | Is it in a random half of c categories? | 1 for the same, else -1 / (c - 1), or -1 / c for odd c |
 

@@ -1,0 +1,75 @@
+"""Sphinx: `make docs` builds the site into docs/_build/html."""
+
+import sys
+from importlib.metadata import version as installed
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from docstrings import converted
+
+ROOT = Path(__file__).parents[1]
+
+project = "torchvsa"
+author = "The torchvsa developers"
+copyright = "2026, the torchvsa developers"
+version = release = installed("torchvsa")
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_design",
+]
+myst_enable_extensions = ["colon_fence"]
+myst_heading_anchors = 4
+autodoc_default_options = {"members": True, "member-order": "bysource"} | {
+    "exclude-members": "set_fit_request, set_partial_fit_request, set_score_request"
+}
+autodoc_typehints = "none"
+napoleon_use_ivar = True
+default_role = "code"
+source_suffix = {".md": "markdown"}
+exclude_patterns = ["_build"]
+html_theme = "furo"
+html_title = f"torchvsa {release}"
+html_theme_options = {"source_view_link": "", "navigation_with_keys": True}
+html_show_sphinx = False
+
+
+SECTIONS = {"studies-index": "What it answers", "running": "Run a study", "main-job": "What it measures"}
+"""Pages whose text is a section of the README."""
+
+
+def linked(text: str) -> str:
+    """Text of the README, or that links to it, with links as they are in this site."""
+    text = (
+        text.replace("](docs/", "](")
+        .replace("](../sim/arenas)", "](world.md)")
+        .replace("](../README.md)", "](start.md)")
+    )
+    for page, title in SECTIONS.items():
+        anchor = title.lower().replace(" ", "-")
+        text = text.replace(f"](../README.md#{anchor})", f"]({page}.md)").replace(f"](#{anchor})", f"]({page}.md)")
+    return text
+
+
+def read(_: object, name: str, source: list[str]) -> None:
+    """Fill the pages whose text stands elsewhere."""
+    if name == "changelog":
+        source[0] = (ROOT / "CHANGELOG.md").read_text()
+    elif name in SECTIONS:
+        text = (ROOT / "README.md").read_text().split(f"## {SECTIONS[name]}\n")[1].split("\n## ")[0]
+        source[0] = f"# {SECTIONS[name]}\n{text}"
+    source[0] = linked(source[0])
+
+
+def markdown(_app: object, _kind: str, _name: str, _what: object, _options: object, lines: list[str]) -> None:
+    """Convert a docstring in place."""
+    lines[:] = converted(lines)
+
+
+def setup(app: object) -> None:
+    """Called by Sphinx."""
+    connect = app.connect  # type: ignore[attr-defined] (an application of Sphinx)
+    connect("source-read", read)
+    connect("autodoc-process-docstring", markdown, priority=600)  # after napoleon
