@@ -7,6 +7,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from behaviours.commands.ask import ask
+from behaviours.commands.show import show
 from experiments import studies
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
@@ -14,7 +16,7 @@ from experiments.kit.run import draw, load
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run `torchvsa STUDY [setting=value ...]` or `torchvsa draw FOLDER`."""
+    """Run `torchvsa STUDY [setting=value ...]`, or one of the commands that `print_commands` lists."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     if not given or given[0] in ("--help", "-h"):
         print_commands(Console())
@@ -23,12 +25,32 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if name == "draw":
         draw_again(rest)
         return
+    if name in ("ask", "show"):
+        with errors_in_one_line(f"torchvsa {name}"):
+            sys.exit(asked(rest) if name == "ask" else shown(rest))
     if name == "settings":
         print(studies.settings_page(), end="")
         return
     with errors_in_one_line("torchvsa"):
         study = studies.find(name)
     run_study(study, rest)
+
+
+def asked(arguments: Sequence[str]) -> bool:
+    """Answer the rows of standard input; whether any could not be answered."""
+    if not 1 <= len(arguments) <= 2:
+        raise ValueError("write torchvsa ask BANK [NAME], with CSV rows from a pipe")
+    name = arguments[1] if len(arguments) > 1 else None
+    return ask(arguments[0], name, sys.stdin, sys.stdout, sys.stderr) > 0
+
+
+def shown(arguments: Sequence[str]) -> bool:
+    """Print what is in the files."""
+    if not arguments:
+        raise ValueError("which file? give one that holds a bank or demonstrations")
+    for argument in arguments:
+        print(show(argument))
+    return False
 
 
 def corral() -> None:
@@ -56,6 +78,8 @@ def print_commands(console: Console) -> None:
     table.add_column("what it answers or does")
     for name, study in STUDIES.items():
         table.add_row(name, study.about)
+    table.add_row("ask BANK [NAME]", "Answer rows of readings: CSV from a pipe, CSV with commands out.")
+    table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)

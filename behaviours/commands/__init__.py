@@ -1,0 +1,1 @@
+"""What the command `torchvsa` does with files: `ask` and `show`."""
