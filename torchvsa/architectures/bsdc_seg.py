@@ -108,11 +108,7 @@ class BSDCSEG(SparseBinary):
         product = spectra[0] * (spectra[1].conj() if conjugate else spectra[1])
         result = torch.fft.irfft(product, n=self.places, dim=-2).flatten(-2)
         dtype = torch.promote_types(a.dtype, b.dtype)
-        if not whole:
-            return result.to(dtype)
-        # A sum of products of bits is at most the number of places.
-        wide = torch.promote_types(dtype, torch.int8 if self.places < 128 else torch.int32)
-        return narrowed(result.round().to(torch.int64), wide, "the product")
+        return narrowed(result.round().to(torch.int64), dtype, "the product") if whole else result.to(dtype)
 
 
 _EXACT = 2**46
