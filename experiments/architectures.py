@@ -166,7 +166,7 @@ def headline(outcome: Outcome) -> str:
     least = f"; none of {', '.join(missing)}" if missing else ", of every architecture at least one"
     return (
         f"{len(well)} of {len(outcome.table)} combinations of architecture and encoder reach the lamp from at least "
-        f"{GOOD:.0%} of the starts with every draw of the codebooks{least}."
+        f"{100 * GOOD:.0f} % of the starts with every draw of the codebooks{least}."
     )
 
 
