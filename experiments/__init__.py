@@ -15,7 +15,6 @@ _NEEDED = (
     "rich",
     "sklearn",
     "scipy",
-    "pybullet",
     "gymnasium",
     "py_trees",
 )
