@@ -11,25 +11,44 @@ from torchvsa._memory_limit import require_memory
 
 
 def quantile_edges(readings: Any, bins: int) -> Float64[Tensor, "edges"]:
-    """The edges `[bins - 1]` that divide readings `[N]` into `bins` bins of nearly equal counts.
+    """The edges `[bins - 1]` that divide readings `[N]` into `bins` bins of nearly equal mass.
 
-    Each edge is midway between two neighbouring readings; where readings repeat, edges coincide. NaN is ignored; with
-    fewer than two readings there are no edges. Raises `ValueError` for infinite readings and for fewer than one bin.
+    The mass is spread over the rows, so that bins have nearly equal counts; but the share of the commonest value, at
+    most half of the mass, is spread over the distinct values, so that a value that repeats often does not take nearly
+    all of the edges. Each edge is midway between two neighbouring distinct values, so that it always separates some
+    readings from others; edges coincide where there are more bins than distinct values. NaN is ignored; with fewer than
+    two distinct values there are no edges.
+
+    Raises `ValueError` for infinite readings and for fewer than one bin.
     """
     if bins < 1:
         raise ValueError(f"readings need at least one bin; got {bins}")
-    values = to_float64(readings, "readings").flatten()
-    if values.isinf().any():
+    readings = to_float64(readings, "readings").flatten()
+    if readings.isinf().any():
         raise ValueError("readings must be finite, or NaN for 'not observed'")
-    values = values[~values.isnan()].sort().values
+    # -0.0 and 0.0 are the same value.
+    observed = ~readings.isnan()
+    values, counts = (readings[observed] + 0.0).unique(return_counts=True)
     if len(values) < 2:
         return values[:0]
     # Six tensors of 8 bytes per bin: positions, readings on both sides, and intermediate results.
     require_memory(6 * 8 * bins, f"the edges of {bins:,} bins", "take fewer bins")
-    above = (torch.arange(1, bins) * len(values)).div(bins, rounding_mode="floor").clamp(min=1)
+    # In whole numbers: of N rows and k values, a row has mass (256 - s)·k and a value s·N, which is 256·N·k in all.
+    rows, distinct = int(counts.sum()), len(values)
+    spread = min(_PARTS * int(counts.max()) // rows, _PARTS // 2)
+    by_rows = counts.cumsum(0) * ((_PARTS - spread) * distinct)
+    mass = by_rows + torch.arange(1, distinct + 1, device=values.device) * (spread * rows)
+    share, rest = divmod(_PARTS * rows * distinct, bins)
+    edges = torch.arange(1, bins, device=values.device)
+    # The first value below which the mass is the wanted one.
+    above = torch.searchsorted(mass, edges * share + edges * rest // bins, right=True).clamp(min=1)
     low, high = values[above - 1], values[above]
     middle = low + (high - low) / 2
     # The difference of large neighbours of opposite signs may overflow.
     middle = torch.where(middle.isinf(), low / 2 + high / 2, middle)
     # The mean of two adjacent floats may be rounded to the lower one, which would not separate them.
     return torch.where(middle > low, middle, high)
+
+
+_PARTS = 256
+"""The share of the commonest value is rounded down to a multiple of 1 / 256."""

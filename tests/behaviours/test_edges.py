@@ -1,0 +1,68 @@
+"""Quantile edges, compared with a direct computation in fractions."""
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+import torch
+
+from behaviours import quantile_edges
+from torchvsa import MAP
+from torchvsa.encoders import ThresholdFeatures
+
+
+def by_mass(readings: list[float], bins: int) -> list[float]:
+    """The edges by walking along the distinct values, whose mass is partly that of their rows."""
+    values = sorted(set(readings))
+    counts = [readings.count(value) for value in values]
+    spread = min(Fraction(256 * max(counts) // len(readings), 256), Fraction(1, 2))
+    share = [(1 - spread) * Fraction(count, len(readings)) + spread / len(values) for count in counts]
+    edges = []
+    for k in range(1, bins):
+        below, above = Fraction(0), 0
+        while below + share[above] <= Fraction(k, bins):
+            below, above = below + share[above], above + 1
+        above = max(above, 1)
+        edges.append((values[above - 1] + values[above]) / 2)
+    return edges
+
+
+@pytest.mark.parametrize("bins", [1, 2, 5, 8, 64, 100])
+@pytest.mark.parametrize("most", [2, 6, 30, 1000])
+def test_the_share_of_the_commonest_value_is_spread_over_all_values(bins: int, most: int) -> None:
+    rng = np.random.default_rng(most)
+    # Small values are frequent.
+    readings = np.floor(most * rng.random(60) ** 3).tolist()
+    assert quantile_edges(readings, bins).tolist() == by_mass(readings, bins)
+
+
+def test_without_repetitions_the_bins_have_equal_counts() -> None:
+    readings = torch.rand(60, generator=torch.Generator().manual_seed(0), dtype=torch.float64)
+    counts = torch.bincount(torch.searchsorted(quantile_edges(readings, 12), readings, right=True))
+    assert counts.tolist() == [5] * 12
+
+
+def test_a_value_that_repeats_leaves_edges_to_the_others() -> None:
+    readings = [0.0] * 900 + list(range(1, 101))
+    edges = quantile_edges(readings, 101)
+    # 0 has 0.45 + 1/202 of the mass; each of the other values has 1/2000 + 1/202.
+    assert int((edges == 0.5).sum()) == 46
+    assert len(edges.unique()) == 55
+
+
+def test_every_edge_separates_some_readings() -> None:
+    readings = torch.tensor([-0.0, 0.0, 0.0, 0.0, 0.0, 3.0, float("nan")])
+    assert quantile_edges(readings, 5).tolist() == [1.5] * 4
+    assert quantile_edges([2.0] * 9, 5).tolist() == []
+    assert quantile_edges([], 5).tolist() == []
+
+
+def test_few_dimensions_are_constant_where_readings_repeat() -> None:
+    rng = np.random.default_rng(0)
+    readings = np.where(rng.random((500, 2)) < 0.8, 0, rng.integers(1, 17, (500, 2))) / 16
+    edges = [quantile_edges(column, 256) for column in readings.T]
+    encoder = ThresholdFeatures(MAP(2000, dtype=torch.int8), 2, 256, 1, edges, seed=0)
+    conditions = encoder(torch.from_numpy(readings))
+    constant = (conditions == conditions[0]).all(0).double().mean()
+    # One dimension in 16 has no comparison.
+    assert 0.04 < constant < 0.09
