@@ -4,14 +4,19 @@ import math
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from numbers import Integral
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import torch
 from jaxtyping import Float64, Shaped
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
-from sklearn.utils.validation import validate_data
+from sklearn.utils._param_validation import Interval
+from sklearn.utils.validation import (
+    _check_sample_weight,  # pyright: ignore[reportPrivateUsage]  # scikit-learn documents no public one
+    validate_data,
+)
 from torch import Tensor
 
 from behaviours.edges import quantile_edges
@@ -29,29 +34,50 @@ _EDGE_BYTES = 24
 """The memory per edge: a float64, a copy while edges are joined, and one more while they are computed."""
 
 
+AT_LEAST_1 = [Interval(Integral, 1, None, closed="left")]
+"""The constraint of a parameter that is a whole number above 0."""
+
+
+class Rows(NamedTuple):
+    """Distinct training rows, in an order that depends on their values alone."""
+
+    readings: Float64[np.ndarray, "N n"]
+    targets: Shaped[np.ndarray, "N m"]
+    weights: Float64[np.ndarray, "N"]
+    given: int
+    """The number of rows that they stand for: those whose weight is not 0."""
+
+
 class QuantileEncoding(BaseEstimator):
     """The base of both estimators: checks parameters, and bins sensors at the quantiles of their readings."""
 
+    _parameter_constraints: ClassVar[dict[str, Any]] = {
+        "dim": AT_LEAST_1,
+        "bins": AT_LEAST_1,
+        "subset": AT_LEAST_1,
+        "random_state": ["random_state"],
+        "verbose": ["verbose"],
+    }
     dim: int
     bins: int
     subset: int
     random_state: Any
     verbose: int
+    n_features_in_: int
+    feature_names_in_: np.ndarray
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
         tags.input_tags.allow_nan = True
         return tags
 
-    def _check_parameters(self) -> None:
+    def check_parameters(self) -> None:
         """Raise `ValueError`, naming the parameter, for invalid parameters."""
+        self._validate_params()
+        # scikit-learn takes True for 1, and does not limit the size of numbers.
         for name in ("dim", "bins", "subset"):
             self._whole(name)
         self._whole("verbose", 0)
-        try:
-            check_random_state(self.random_state)
-        except ValueError as error:
-            raise ValueError(f"random_state={self.random_state!r} is not a seed: {error}") from error
 
     def _whole(self, name: str, at_least: int = 1) -> int:
         """The parameter `name` as an int."""
@@ -86,8 +112,28 @@ class QuantileEncoding(BaseEstimator):
 
         return show
 
-    def _space(self, readings: Float64[np.ndarray, "N n"], actuators: list[Actuator]) -> Space:
-        """A space for these readings; the bin edges depend on the readings alone."""
+    def _rows(self, readings: Float64[np.ndarray, "N n"], targets: np.ndarray, sample_weight: Any) -> Rows:
+        """The distinct rows of readings and targets `[N]` or `[N, m]`; their weights are added up.
+
+        A row of weight 2 is therefore the same as two rows, a row of weight 0 is none, and the order of rows does not
+        matter. Raises `ValueError` for weights that are negative, not finite, or all 0.
+        """
+        weights = np.ones(len(readings))
+        if sample_weight is not None:
+            weights = _check_sample_weight(sample_weight, readings, dtype=np.float64, ensure_non_negative=True)
+        _check_observed(readings)
+        counted = weights > 0
+        readings, targets, weights = readings[counted], targets[counted].reshape(counted.sum(), -1), weights[counted]
+        # Equal rows have equal bytes: one NaN, and no -0.0.
+        table = np.c_[np.where(np.isnan(readings), np.nan, readings), targets] + 0.0
+        keys = table.view(np.dtype((np.void, table.dtype.itemsize * table.shape[1])))[:, 0]
+        _, first, index = np.unique(keys, return_index=True, return_inverse=True)
+        return Rows(readings[first], targets[first], np.bincount(index, weights), len(weights))
+
+    def _space(
+        self, readings: Float64[np.ndarray, "N n"], actuators: list[Actuator], weights: Float64[np.ndarray, "N"]
+    ) -> Space:
+        """A space for these readings; the bin edges depend on readings and weights alone."""
         bins, features = self._whole("bins"), readings.shape[1]
         require_memory(
             _EDGE_BYTES * bins * features,
@@ -98,11 +144,12 @@ class QuantileEncoding(BaseEstimator):
         names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(features)])
         sensors, edges = [], []
         for name, column in zip(names, torch.tensor(readings).T, strict=True):
-            observed = column[~column.isnan()]
+            seen = ~column.isnan()
+            observed = column[seen]
             low, high = (observed.min().item(), observed.max().item()) if len(observed) else (0.0, 0.0)
             low, high = (low, high) if low < high else _around(low)
             sensors.append(Sensor(str(name), low, high, out_of_range="clip"))
-            edges.append((quantile_edges(observed, bins) - low) / (high - low))
+            edges.append((quantile_edges(observed, bins, torch.from_numpy(weights)[seen]) - low) / (high - low))
         vsa = MAP(self._whole("dim"), dtype=torch.int8)
         encoder = ThresholdFeatures(vsa, features, bins, self._whole("subset"), edges)
         codes = Balanced(vsa, max(actuator.levels for actuator in actuators))
@@ -112,9 +159,7 @@ class QuantileEncoding(BaseEstimator):
         self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = no_progress
     ) -> list[Shaped[Tensor, "batch d"]]:
         """The encoded rows in blocks. Raises `ValueError` for a row in which nothing was observed."""
-        unobserved = np.isnan(readings).all(1)
-        if unobserved.any():
-            raise ValueError(f"row {int(unobserved.argmax())} has no observed feature: all of its values are NaN")
+        _check_observed(readings)
         blocks = torch.tensor(readings).split(_ROWS)
         conditions = []
         for number, block in enumerate(blocks, 1):
@@ -127,6 +172,13 @@ class QuantileEncoding(BaseEstimator):
         # Its validation sums the readings, which overflows for the largest floats.
         with np.errstate(over="ignore", invalid="ignore"):
             return validate_data(self, *data, dtype=np.float64, order="C", ensure_all_finite="allow-nan", **options)
+
+
+def _check_observed(readings: Float64[np.ndarray, "N n"]) -> None:
+    """Raise `ValueError` for a row in which nothing was observed."""
+    unobserved = np.isnan(readings).all(1)
+    if unobserved.any():
+        raise ValueError(f"row {int(unobserved.argmax())} has no observed feature: all of its values are NaN")
 
 
 def _around(value: float) -> tuple[float, float]:

@@ -80,20 +80,30 @@ class Descent:
         """The mean loss of these samples."""
         scores = self.sample_scores(self.program(self.floats()), rows)
         targets = self.samples.result[rows]
+        losses = self._losses(scores, targets)
+        if self.samples.weights is not None:
+            losses = losses * self.samples.weights[rows]
+        return losses.mean()
+
+    def _losses(self, scores: Float[Tensor, "batch r"], targets: Int64[Tensor, "batch"]) -> Float[Tensor, "batch"]:
         if self.rule.loss == "squared":
-            return ((scores - functional.one_hot(targets, scores.shape[1])) ** 2).sum(1).mean()
+            return ((scores - functional.one_hot(targets, scores.shape[1])) ** 2).sum(1)
         # A last column of 0: the score of no answer.
         scores = functional.pad(scores, (0, 1))
         if self.rule.loss == "cross_entropy":
-            return functional.cross_entropy(scores, targets)
+            return functional.cross_entropy(scores, targets, reduction="none")
         violation = (1 - scores.gather(1, targets[:, None]) + scores).clamp(min=0)
-        return (violation.scatter(1, targets[:, None], 0) ** 2).sum(1).mean()
+        return (violation.scatter(1, targets[:, None], 0) ** 2).sum(1)
 
     @torch.no_grad()
-    def count_wrong(self, program: Shaped[Tensor, "d"], rows: Int64[Tensor, "N"]) -> int:
-        """The number of these samples for which another result than theirs scores highest."""
-        parts = [self.sample_scores(program, part).argmax(1) != self.samples.result[part] for part in rows.split(_ROWS)]
-        return sum(int(part.sum()) for part in parts)
+    def count_wrong(self, program: Shaped[Tensor, "d"], rows: Int64[Tensor, "N"]) -> float:
+        """The number (with weights, the weight) of the samples that another result than theirs wins."""
+        weights = self.samples.weights
+        wrong = 0.0
+        for part in rows.split(_ROWS):
+            missed = self.sample_scores(program, part).argmax(1) != self.samples.result[part]
+            wrong += float(missed.sum() if weights is None else weights[part][missed].sum())
+        return wrong
 
     @torch.no_grad()
     def predict(self, program: Shaped[Tensor, "d"]) -> Int64[Tensor, "k"]:
@@ -112,7 +122,7 @@ class Descent:
         optimiser = torch.optim.Adam([self.parameters], lr=rule.learning_rate)
         steps_per_epoch = math.ceil(len(train) / rule.batch_size)
         steps = steps_per_epoch * rule.epochs
-        best, best_wrong, best_epoch = self.floats().detach().clone(), len(validation) + 1, 0
+        best, best_wrong, best_epoch = self.floats().detach().clone(), math.inf, 0
         total, averaged = torch.zeros_like(best, dtype=torch.float64), 0
         step = epoch = 0
         for epoch in range(1, rule.epochs + 1):

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import torch
+from jaxtyping import Float64
 from torch import Tensor
 
 from behaviours.behaviour import Behaviour
@@ -82,16 +83,29 @@ class Gradient(Rule):
             seed=as_int("seed", self.seed, *_SEEDS),
         )
 
-    def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
+    def fit(
+        self,
+        space: Space,
+        demonstrations: Demonstrations,
+        progress: Progress = no_progress,
+        weights: Float64[Tensor, "N"] | None = None,
+    ) -> Behaviour:
         """Learn a behaviour, see `Rule.fit`.
 
-        Raises `ValueError` if `validation_fraction` leaves no condition to train on or none to validate with, and if
-        the program becomes infinite.
+        `weights`, one positive number per row of the demonstrations, multiply the losses of the samples; only their
+        ratios matter. They do not decide between contradicting samples: use them with `contradictions="all"`.
+
+        Raises `ValueError` if `validation_fraction` leaves no condition to train on or none to validate with, if the
+        program becomes infinite, and for weights that are not positive.
         """
-        return self._learn(space, demonstrations, None, progress)
+        return self._learn(space, demonstrations, None, progress, weights)
 
     def partial_fit(
-        self, behaviour: Behaviour, demonstrations: Demonstrations, progress: Progress = no_progress
+        self,
+        behaviour: Behaviour,
+        demonstrations: Demonstrations,
+        progress: Progress = no_progress,
+        weights: Float64[Tensor, "N"] | None = None,
     ) -> Behaviour:
         """Train the program of `behaviour` further, with a new optimiser and schedule; see `Rule.partial_fit`.
 
@@ -102,19 +116,22 @@ class Gradient(Rule):
             raise ValueError(
                 f"output={self.output!r} rounds the program, so that small steps are lost; continue with output='float'"
             )
-        return self._learn(behaviour.space, demonstrations, behaviour, progress)
+        return self._learn(behaviour.space, demonstrations, behaviour, progress, weights)
 
     def _learn(
-        self, space: Space, demonstrations: Demonstrations, before: Behaviour | None, progress: Progress
+        self,
+        space: Space,
+        demonstrations: Demonstrations,
+        before: Behaviour | None,
+        progress: Progress,
+        weights: Tensor | None,
     ) -> Behaviour:
         # The caller may have disabled gradients, and tensors created in inference mode cannot have any.
         with torch.inference_mode(False), torch.enable_grad():
-            return self._train(space, demonstrations, before, progress)
+            shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.1))
+            return self._train(space, shown.weighted(weights), before, progress)
 
-    def _train(
-        self, space: Space, demonstrations: Demonstrations, before: Behaviour | None, progress: Progress
-    ) -> Behaviour:
-        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.1))
+    def _train(self, space: Space, shown: Samples, before: Behaviour | None, progress: Progress) -> Behaviour:
         if before is not None:
             shown = shown.with_known_results(before.results)
         targets = shown.targets("first" if self.contradictions == "all" else self.contradictions)

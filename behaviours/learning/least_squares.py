@@ -81,7 +81,7 @@ class LeastSquares(Rule):
             targets = functional.pad(targets, (0, 0, 0, len(samples.silent)))
         every = samples.items(space)
         targets = functional.pad(targets, (0, len(every) - len(items)))
-        program = solve(space.vsa, fitted, every, targets, self.ridge, subrange(progress, 0.2, 0.9))
+        program = solve(space.vsa, fitted, every, targets, self.ridge, progress=subrange(progress, 0.2, 0.9))
         predicted = space.vsa.readout(program, items)(conditions).argmax(1)
         report = samples.report(
             self.name,
@@ -118,12 +118,13 @@ def solve(
     items: Shaped[Tensor, "r d"],
     targets: Float64[Tensor, "k r"],
     ridge: float,
+    weights: Float64[Tensor, "k"] | None = None,
     progress: Progress = no_progress,
 ) -> Float[Tensor, "d"]:
-    """The program p that minimises the sum over k and r of (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
+    """The program p that minimises the sum over k and r of w_k (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
 
-    `s` is the mean squared length of a pair c ⊗ r. With k·r pairs the system has k·r unknowns in the dual and d in the
-    primal form; the smaller one is solved, in float64.
+    `s` is the mean squared length of a pair c ⊗ r, and w_k the weight of a condition, by default 1. With k·r pairs the
+    system has k·r unknowns in the dual and d in the primal form; the smaller one is solved, in float64.
 
     Args:
         vsa: The architecture of the hypervectors.
@@ -131,6 +132,7 @@ def solve(
         items: The hypervectors r that they are bound with.
         targets: The target score of each pair.
         ridge: The weight of the squared length of p, above 0.
+        weights: The weight of each condition, above 0.
         progress: Called with the completed fraction of the work.
 
     Raises:
@@ -148,6 +150,10 @@ def solve(
     c, r = (as_bipolar(x).to(torch.float32 if exact else torch.float64) for x in (conditions, items))
     pairs = len(c) * len(r)
     weight = ridge * float((c.double() ** 2).sum(0) @ (r.double() ** 2).sum(0)) / pairs
+    if weights is not None and not (weights == 1).all():
+        # A row of weight w is √w times as long.
+        roots = weights.sqrt()[:, None]
+        c, targets = roots * c, roots * targets
     if pairs <= vsa.dim:
         rows = (c[:, None] * r).flatten(0, 1)
         system = (rows @ rows.T).double()

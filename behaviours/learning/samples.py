@@ -13,6 +13,7 @@ from behaviours.ordered import distinct_rows
 from behaviours.progress import Progress, no_progress
 from behaviours.report import LearningReport
 from behaviours.space import Space
+from behaviours.tables import to_float64
 from torchvsa import VSA
 
 Contradictions = Literal["first", "majority", "latest"]
@@ -43,6 +44,8 @@ class Samples:
     """Further conditions, on which a behaviour is to be silent."""
     rivals: Int64[Tensor, "s m"] | None = None
     """Further results, which others may have: they are not to win, but are not stored."""
+    weights: Float64[Tensor, "N"] | None = None
+    """How much each sample counts in the loss of `Gradient`; their mean is 1."""
 
     @classmethod
     def of(
@@ -74,6 +77,20 @@ class Samples:
         """The same samples, with indices into `results` (stored before) followed by the new results."""
         joined, index = distinct_rows(torch.cat([results, self.results]))
         return replace(self, results=joined, result=index[len(results) :][self.result])
+
+    def weighted(self, weights: Any) -> "Samples":
+        """The same samples with these weights, scaled to a mean of 1. Raises `ValueError` unless all are positive."""
+        if weights is None:
+            return self
+        given = to_float64(weights, "weights").to(self.condition.device)
+        if given.shape != self.condition.shape or not (given.isfinite() & (given > 0)).all():
+            raise ValueError(
+                f"weights are one positive, finite number per row, [{len(self.condition)}]; got shape "
+                f"{tuple(given.shape)}, from {given.min().item():g} to {given.max().item():g}"
+            )
+        # Divided by the largest first, so that the sum is finite.
+        given = given / given.max()
+        return self if (given == 1).all() else replace(self, weights=given / given.mean())
 
     def targets(self, contradictions: Contradictions) -> Int64[Tensor, "k"]:
         """The index of the result to learn for each condition, with contradictions resolved."""

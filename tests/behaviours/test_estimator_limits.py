@@ -89,7 +89,9 @@ PARAMETERS = (
         for value in NOT_WHOLE
     ]
     + [(classifier, name, value) for name in ("epochs", "batch_size") for value in NOT_WHOLE]
+    + [(classifier, "patience", value) for value in NOT_WHOLE]
     + [(classifier, "learning_rate", value) for value in NOT_POSITIVE]
+    + [(classifier, "validation_fraction", value) for value in (-0.1, 1, math.nan, "x", None)]
     + [(regressor, "ridge", value) for value in NOT_POSITIVE]
     + [(model, "verbose", value) for model in MODELS for value in (-1, 0.5, "yes", None)]
     + [(model, "random_state", value) for model in MODELS for value in (-1, 2**32, "a", 1.5)]
@@ -101,7 +103,7 @@ def test_parameters_that_cannot_work_are_named(model: Any, name: str, value: Any
     made = model(**{name: value})
     for fit in (made.fit, made.partial_fit) if model is classifier else (made.fit,):
         # Before any work: not even the data are looked at.
-        with pytest.raises(ValueError, match=f"^{name}(=| is )") as caught:
+        with pytest.raises(ValueError, match=f"^(The '{name}' parameter of Behaviour.* must be |{name} is )") as caught:
             fit([["not", "looked", "at"]], [0])
         assert "\n" not in str(caught.value)
 
@@ -109,7 +111,7 @@ def test_parameters_that_cannot_work_are_named(model: Any, name: str, value: Any
 def test_parameters_that_turn_out_too_small_or_large() -> None:
     twice = np.r_[X, X]
     with pytest.raises(ValueError, match="ridge=1e-300 is too small"):
-        regressor(ridge=1e-300).fit(twice, np.r_[VALUES, VALUES])
+        regressor(ridge=1e-300).fit(twice, np.r_[VALUES, VALUES + 1])
     with pytest.raises(ValueError, match=r"learning_rate=9e\+29 made the program infinite; take a lower one"):
         classifier(learning_rate=9e29).fit(X, LABELS)
     with pytest.raises(ValueError, match="learning_rate"):
