@@ -9,17 +9,14 @@ import torch
 from jaxtyping import Shaped
 from torch import Tensor, nn
 
-from behaviours.algebra import terms_from_dicts, terms_to_dicts
+from behaviours.bank_files import LEAST, check_name, load_behaviours, save_behaviours
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import ErrorDriven, Gradient, Rule, require_rule
-from behaviours.memory import check_levels
-from behaviours.options import as_float
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.recall import Recall, over_unique_rows
 from behaviours.report import LearningReport
 from behaviours.space import Space, conditions_of
-from behaviours.storage import Layout, check_layout, error_context, load_tensors, save_tensors
 from torchvsa._blocks import by_blocks
 
 
@@ -130,7 +127,7 @@ class BehaviourBank(nn.Module):
         before = self[name]
         behaviour = rule.partial_fit(before, demonstrations, progress)
         behaviour.calibrate(demonstrations)
-        for least in _LEAST:
+        for least in LEAST:
             values = getattr(before, least), getattr(behaviour, least)
             if None not in values:
                 setattr(behaviour, least, min(values))
@@ -220,17 +217,7 @@ class BehaviourBank(nn.Module):
         The same bank gives the same bytes. Raises `ValueError` for what `load` would refuse: programs that are not
         finite, and codebooks of another type than the architecture's (as after `.half()`).
         """
-        space = self.space.config()
-        tensors = {f"space.{key}": value for key, value in self.space.state_dict().items()}
-        check_layout(tensors, _codebooks(space))
-        for number, name in enumerate(self):
-            behaviour = self[name]
-            with error_context(f"behaviour {name!r}"):
-                behaviour.check()
-            parts = {"program": behaviour.program, "known": behaviour.known, "results": behaviour.results}
-            tensors |= {f"behaviours.{number}.{key}": tensor for key, tensor in parts.items()}
-        behaviours = [_entry(name, self[name]) for name in self]
-        return save_tensors(path, "bank", tensors, {"space": space, "behaviours": behaviours})
+        return save_behaviours(path, self.space, {name: self[name] for name in self})
 
     @classmethod
     def load(cls, path: str | Path) -> "BehaviourBank":
@@ -239,62 +226,8 @@ class BehaviourBank(nn.Module):
         All tensors are compared with the description before any object is created. Raises `ValueError` that names the
         file and what in it is wrong.
         """
-        tensors, about = load_tensors(path, "bank")
-        with error_context(f"{path} does not describe a bank of this version"):
-            with error_context("behaviours"):
-                entries = [(entry["name"], LearningReport(**entry["report"])) for entry in about["behaviours"]]
-                terms = [entry.get("terms") for entry in about["behaviours"]]
-                used = [entry.get("sensors") for entry in about["behaviours"]]
-                least = [
-                    {name: as_float(name, entry[name], -1) for name in _LEAST if entry.get(name) is not None}
-                    for entry in about["behaviours"]
-                ]
-                for name, _ in entries:
-                    check_name(name)
-                if len({name for name, _ in entries}) < len(entries):
-                    raise ValueError("two of them have the same name")
-            with error_context("space"):
-                codebooks = _codebooks(about["space"])
-                check_layout(
-                    {name: tensor for name, tensor in tensors.items() if not name.startswith("behaviours.")}, codebooks
-                )
-            parts = {f"behaviours.{number}.{key}" for number in range(len(entries)) for key in _PARTS}
-            if wrong := sorted(parts ^ (tensors.keys() - codebooks.keys())):
-                raise ValueError(f"tensor {wrong[0]!r} is {'missing' if wrong[0] in parts else 'not described'}")
-            with error_context("space"):
-                space = Space.from_config(
-                    about["space"], {name.removeprefix("space."): tensors[name] for name in codebooks}
-                )
-                spaces = [space if sensors is None else space.using(sensors) for sensors in used]
-            bank = cls(space)
-            for number, (name, report) in enumerate(entries):
-                with error_context(f"behaviour {name!r}"):
-                    program, known, results = (tensors[f"behaviours.{number}.{key}"] for key in _PARTS)
-                    check_levels(space.schema, results)
-                    parsed = () if terms[number] is None else terms_from_dicts(terms[number], results)
-                    behaviour = Behaviour(spaces[number], program, known, results, report, parsed)
-                    vars(behaviour).update(least[number])
-                bank.add(name, behaviour)
+        space, behaviours = load_behaviours(path)
+        bank = cls(space)
+        for name, behaviour in behaviours.items():
+            bank.add(name, behaviour)
         return bank
-
-
-_PARTS, _LEAST = ("program", "known", "results"), ("threshold", "least_similarity")
-
-
-def _codebooks(config: dict[str, Any]) -> Layout:
-    return {f"space.{name}": spec for name, spec in Space.layout(config).items()}
-
-
-def _entry(name: str, behaviour: Behaviour) -> dict[str, Any]:
-    entry = {"name": name, "report": behaviour.report.to_dict()}
-    entry |= {name: value for name in _LEAST if (value := getattr(behaviour, name)) is not None}
-    if len(behaviour.space.sensors) < len(behaviour.space.schema.sensors):
-        entry |= {"sensors": list(behaviour.space.sensors)}
-    # A behaviour that is no sum has no terms to write.
-    return entry | ({"terms": terms_to_dicts(behaviour.terms, behaviour.results)} if behaviour.report.terms else {})
-
-
-def check_name(name: object) -> None:
-    """Raise `ValueError` unless `name` is a string that is not empty."""
-    if not isinstance(name, str) or not name:
-        raise ValueError(f"a behaviour's name is a text that is not empty; got {name!r}")

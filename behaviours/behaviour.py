@@ -21,14 +21,13 @@ from behaviours.algebra import (
 from behaviours.controller import Controller
 from behaviours.demonstrations import Demonstrations
 from behaviours.frozen import FrozenBehaviour
-from behaviours.memory import ResultMemory, check_levels
+from behaviours.memory import ResultMemory, SmoothMemory, check_levels, check_vector, require_levels
 from behaviours.ordered import distinct_rows
 from behaviours.recall import Recall, answer_cells, answer_conditions
-from behaviours.report import LearningReport
-from behaviours.schema import Actuator, Sensor
+from behaviours.report import LearningReport, name_list
 from behaviours.space import Space, check_addable
 from behaviours.storage import checksum
-from torchvsa import VSA, Readout, ShapeError
+from torchvsa import Readout
 from torchvsa._numerics import as_bipolar, is_integer
 from torchvsa.encoders.mirrored import mirrored
 
@@ -49,6 +48,11 @@ class Behaviour(Controller):
     recalls the results of all its `terms`. A term whose weights add up to 0 is removed, with the results that only it
     had.
 
+    A `smooth` behaviour commands any value between the ends of an actuator's range instead of a stored result: the
+    inner product of the unbound result with the actuator's role, which is -1 at the lower and 1 at the upper end
+    (values beyond are clipped). It is learned by `LeastSquares(smooth=True)`. In a sum the inner products are added, as
+    forces are: a command in the middle of the range has none.
+
     Source: Neubert et al. 2016, Algorithm 2; sums of programs, section V.
     """
 
@@ -63,10 +67,11 @@ class Behaviour(Controller):
         results: Int64[Tensor, "k m"],
         report: LearningReport,
         terms: Sequence[Term] = (),
+        smooth: bool = False,
     ) -> None:
         super().__init__()
         for name, vector in (("program", program), ("known", known)):
-            _check_vector(space.vsa, name, vector)
+            check_vector(space.vsa, name, vector)
         self.space = space
         self.report = report
         self.name = ""
@@ -81,13 +86,18 @@ class Behaviour(Controller):
         else:
             self.register_buffer("program", program)
         self.register_buffer("known", known)
-        self.memory = ResultMemory(space, results)
+        self.memory = SmoothMemory(space, results) if smooth else ResultMemory(space, results)
 
     def check(self) -> None:
         """Raise `ValueError` unless the behaviour can be saved, see `BehaviourBank.save`."""
         for name in ("program", "known"):
-            _check_vector(self.space.vsa, name, getattr(self, name))
+            check_vector(self.space.vsa, name, getattr(self, name))
         check_levels(self.space.schema, self.results)
+
+    @property
+    def smooth(self) -> bool:
+        """Whether commands may be between the levels."""
+        return self.memory.smooth
 
     def over(self, space: Space) -> "Behaviour":
         """The same behaviour over another space with equal codebooks, on the device of that space."""
@@ -96,7 +106,8 @@ class Behaviour(Controller):
         program = self.program.detach().to(device)
         if isinstance(self.program, nn.Parameter):
             program = nn.Parameter(program)
-        moved = Behaviour(space, program, self.known.to(device), self.results.to(device), self.report, self._terms)
+        known, results = self.known.to(device), self.results.to(device)
+        moved = Behaviour(space, program, known, results, self.report, self._terms, self.smooth)
         moved.threshold, moved.least_similarity = self.threshold, self.least_similarity
         return moved
 
@@ -118,8 +129,8 @@ class Behaviour(Controller):
             weights: One finite number per behaviour; by default all are 1.
 
         Raises:
-            ValueError: For behaviours over different codebooks, for weights that are not finite, and if no term is left
-                because all weights are 0 or all terms cancel.
+            ValueError: For behaviours over different codebooks, for smooth ones with others, for weights that are not
+                finite, and if no term is left because all weights are 0 or all terms cancel.
         """
         weights = [checked_weight(weight) for weight in ([1] * len(behaviours) if weights is None else weights)]
         weighted = [(part, weight) for part, weight in zip(behaviours, weights, strict=True) if weight]
@@ -127,13 +138,15 @@ class Behaviour(Controller):
             raise ValueError("a sum of behaviours needs at least one with a weight that is not 0")
         space = weighted[0][0].space
         check_addable([part.space for part, _ in weighted])
+        if not (smooth := all(part.smooth for part, _ in weighted)):
+            require_levels("a sum with behaviours that are not smooth", [part for part, _ in weighted])
         terms = merge_terms([replace(t, weight=weight * t.weight) for part, weight in weighted for t in part.terms])
         if not terms:
             raise ValueError("the behaviours of this sum cancel each other, so that no term is left")
         weights, device = [weight for _, weight in weighted], space.device
         program = weighted_sum(space.vsa, weights, [part.program.detach().to(device) for part, _ in weighted])
         known = weighted_sum(space.vsa, weights, [part.known.to(device) for part, _ in weighted])
-        return cls(space, program, known, merged_results(terms).to(device), merged_report(terms), terms)
+        return cls(space, program, known, merged_results(terms).to(device), merged_report(terms), terms, smooth)
 
     def __add__(self, other: object) -> "Behaviour":
         return Behaviour.sum([self, other]) if isinstance(other, Behaviour) else NotImplemented
@@ -182,7 +195,7 @@ class Behaviour(Controller):
         # The mirror image of a mirror image is what was learned.
         learned = len(terms) == 1 and terms[0].weight == 1 and not terms[0].mirrored
         report = terms[0].report if learned else merged_report(terms)
-        image = Behaviour(space, program, known, results, report, () if learned else terms)
+        image = Behaviour(space, program, known, results, report, () if learned else terms, self.smooth)
         image.threshold, image.least_similarity = self.threshold, self.least_similarity
         return image
 
@@ -196,26 +209,28 @@ class Behaviour(Controller):
         return self.space.vsa.readout(self.program, self.memory.current_items())
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        return answer_cells(self.space.encode, self.readout(), self.known, self.memory.commands, cells)
+        return answer_cells(self.space.encode, self.readout(), self.known, self.memory.commands, cells, self.smooth)
 
     def query(self, conditions: Shaped[Tensor, "batch d"]) -> Recall:
         """The answer to encoded and protected conditions (Algorithm 2, lines 2 to 8)."""
-        return answer_conditions(self.readout(), self.known, self.memory.commands, conditions)
+        return answer_conditions(self.readout(), self.known, self.memory.commands, conditions, self.smooth)
 
     def freeze(self) -> FrozenBehaviour:
         """A read-only copy with the fastest recall, see `FrozenBehaviour`."""
         readout = self.space.vsa.readout(self.program.detach(), self.memory.current_items())
-        return FrozenBehaviour(self.space, readout, self.known, self.memory.commands)
+        return FrozenBehaviour(self.space, readout, self.known, self.memory.commands, self.smooth)
 
     def scores(self, readings: Any) -> Float[Tensor, "batch k"]:
         """The score of each of `results`, `<unbind(program, condition), item> / |item|`, which recall compares.
 
-        In float64, and differentiable with respect to the program, see `trainable`.
+        In float64, and differentiable with respect to the program, see `trainable`. Of a smooth behaviour it is the
+        command of each actuator, `[B, m]`, on a scale from -1 to 1.
         """
         return self.readout()(self.space.encode(self.space.cells(readings)))
 
     def labels(self, commands: Any) -> Int64[Tensor, "batch"]:
         """The index in `results` of each row of commands `[B, m]`. Raises `ValueError` if it is not stored."""
+        require_levels("labels", [self])
         levels = self.space.schema.command_levels(commands).to(self.results.device)
         same = (levels[:, None] == self.results).all(-1)
         if not same.any(-1).all():
@@ -257,7 +272,8 @@ class Behaviour(Controller):
         program = as_bipolar(self.program).detach()
         dtype = torch.float32 if is_integer(program) else program.dtype
         parameter = nn.Parameter(program.to(dtype, copy=True))
-        return Behaviour(self.space, parameter, self.known.clone(), self.results.clone(), self.report)
+        known, results = self.known.clone(), self.results.clone()
+        return Behaviour(self.space, parameter, known, results, self.report, smooth=self.smooth)
 
     def clipped(self) -> "Behaviour":
         """A copy whose program and known conditions are normalised hypervectors instead of raw sums.
@@ -267,7 +283,7 @@ class Behaviour(Controller):
         """
         vsa = self.space.vsa
         program = vsa.normalize(self.program.detach())
-        return Behaviour(self.space, program, vsa.normalize(self.known), self.results, self.report)
+        return Behaviour(self.space, program, vsa.normalize(self.known), self.results, self.report, smooth=self.smooth)
 
     def __repr__(self) -> str:
         schema, report = self.space.schema, self.report
@@ -276,25 +292,6 @@ class Behaviour(Controller):
         origin = f"sum of {', '.join(report.terms)}" if report.terms else f"{report.rule}, {report.pairs} pairs"
         return (
             f"Behaviour({name}d={self.space.vsa.dim}, {name_list('sensors', used)}, "
-            f"{name_list('actuators', schema.actuators)}, {origin}, {len(self.results)} results)"
+            f"{name_list('actuators', schema.actuators)}, {origin}, "
+            f"{'smooth' if self.smooth else f'{len(self.results)} results'})"
         )
-
-
-def name_list(what: str, parts: Sequence[Sensor] | Sequence[Actuator], most: int = 6) -> str:
-    """The number of sensors or actuators, and the names of the first few."""
-    names = ", ".join(part.name for part in parts[:most]) + (", ..." if len(parts) > most else "")
-    return f"{len(parts)} {what} ({names})"
-
-
-_REAL = (torch.int8, torch.int32, torch.int64, torch.float32, torch.float64)
-
-
-def _check_vector(vsa: VSA, name: str, vector: Tensor) -> None:
-    """Raise `ValueError` unless `vector` can be a program, or a sum of conditions, of this architecture."""
-    if vector.shape != (vsa.dim,):
-        raise ShapeError(f"{name} must be one hypervector [{vsa.dim}]; got shape {tuple(vector.shape)}")
-    kinds = (torch.complex64, torch.complex128) if vsa.dtype.is_complex else (*_REAL, vsa.dtype)
-    if vector.dtype not in kinds:
-        raise ValueError(f"{name} of {vsa} cannot be {vector.dtype}; it is one of {', '.join(map(str, kinds))}")
-    if not vector.isfinite().all():
-        raise ValueError(f"{name} holds values that are not finite")

@@ -38,9 +38,15 @@ class FrozenBehaviour(Controller):
     commands: Tensor
 
     def __init__(
-        self, space: Space, readout: Readout, known: Shaped[Tensor, "d"], commands: Float64[Tensor, "k m"]
+        self,
+        space: Space,
+        readout: Readout,
+        known: Shaped[Tensor, "d"],
+        commands: Float64[Tensor, "k m"],
+        smooth: bool = False,
     ) -> None:
         super().__init__()
+        self.smooth = smooth
         self.space, self.readout = copy.deepcopy(space), copy.deepcopy(readout)
         self.register_buffer("known", known.detach().clone(), persistent=False)
         self.register_buffer("commands", commands.clone(), persistent=False)
@@ -61,7 +67,7 @@ class FrozenBehaviour(Controller):
         return None if self._tick is None or torch.compiler.is_compiling() else self._tick(readings)
 
     def _answer(self, cells: Shaped[Tensor, "batch w"]) -> Recall:
-        return answer_cells(self.space.encode, self.readout, self.known, self.commands, cells)
+        return answer_cells(self.space.encode, self.readout, self.known, self.commands, cells, self.smooth)
 
     def __getstate__(self) -> dict[str, Any]:
         # The fast path is made of functions, which no file or other process takes.
@@ -103,7 +109,8 @@ class _Tick:
         self.table = torch.cat(rows).numpy()
         self.lengths = torch.where(readout.lengths == 0, 1.0, readout.lengths).numpy()
         self.known_length = float(norms(known))
-        self.commands = frozen.commands.numpy()
+        self.commands, self.smooth = frozen.commands.numpy(), frozen.smooth
+        self.unit = 1.0 if readout.units is None else float(readout.units)
 
     @classmethod
     def of(cls, frozen: FrozenBehaviour) -> "_Tick | None":
@@ -127,13 +134,20 @@ class _Tick:
         products = self.table @ condition
         length, noise = math.sqrt(squares.sum()), math.sqrt(self.noise(condition, squares)) or 1.0
         scores = products[:-1] / self.lengths
-        best = int(scores.argmax())
-        top = scores[best]
-        scores[best] = -np.inf
         familiarity = products[-1] / (length * self.known_length or 1.0)
-        margin = top - scores.max() if len(scores) > 1 else np.inf
-        scalars = torch.from_numpy(np.array([[top / noise], [margin / noise], [familiarity]], dtype=np.float32))
-        return Recall(torch.from_numpy(self.commands[best : best + 1].copy()), *scalars.unbind())
+        if self.smooth:
+            low, high = self.commands
+            shares = (np.clip(scores * self.unit, -1, 1) + 1) / 2
+            commands = np.minimum(low + shares * (high - low), high)[None]
+            similarity, margin = min(math.sqrt(scores @ scores) / noise, 1.0), np.inf
+        else:
+            best = int(scores.argmax())
+            top = scores[best]
+            scores[best] = -np.inf
+            commands, similarity = self.commands[best : best + 1].copy(), top / noise
+            margin = (top - scores.max()) / noise if len(scores) > 1 else np.inf
+        scalars = torch.from_numpy(np.array([[similarity], [margin], [familiarity]], dtype=np.float32))
+        return Recall(torch.from_numpy(commands), *scalars.unbind())
 
     def _valid(self, values: list[float]) -> bool:
         """Whether each reading is in range or NaN, and not all are NaN. (For so few numbers NumPy is slower.)"""

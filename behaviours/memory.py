@@ -1,6 +1,6 @@
-"""The clean-up memory of results, and the commands that each result decodes to."""
+"""The clean-up memory of results and the commands that each result decodes to; the roles of smooth commands."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import torch
@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from behaviours.ordered import distinct_rows, in_order_of_appearance
 from behaviours.schema import Schema
 from behaviours.space import Space
-from torchvsa import CleanUp, ShapeError
+from torchvsa import VSA, CleanUp, ShapeError
 
 
 class ResultMemory(nn.Module):
@@ -20,6 +20,8 @@ class ResultMemory(nn.Module):
     items. The clean-up memory of an actuator holds the codes of its levels in `levels`, in order of first appearance.
     """
 
+    smooth = False
+    """Whether commands may be between the levels, see `SmoothMemory`."""
     levels: Tensor
     items: Tensor
     commands: Tensor
@@ -62,6 +64,34 @@ class ResultMemory(nn.Module):
         return self
 
 
+class SmoothMemory(ResultMemory):
+    """What a smooth behaviour reads out: `items` `[m, d]` are the roles of the actuators.
+
+    `commands` `[2, m]` are the lowest and the highest command of each. `levels` are the results that were shown,
+    rounded to levels; nothing is compared with them.
+    """
+
+    smooth = True
+
+    def derive(self) -> None:
+        """Take the roles and the ends from the space."""
+        (space,) = self._space
+        self.items = space.result_encoder.roles.clone()
+        ends = [[getattr(actuator, end) for actuator in space.schema.actuators] for end in ("low", "high")]
+        self.commands = torch.tensor(ends, dtype=torch.float64, device=self.items.device)
+        self._derived_from = tuple(tensor.clone() for tensor in self._sources())
+
+
+def require_levels(what: str, behaviours: Iterable[Any]) -> None:
+    """Raise `ValueError` that begins with `what` if one of these behaviours, or other modules, is smooth."""
+    for behaviour in behaviours:
+        if getattr(behaviour, "smooth", False):
+            raise ValueError(
+                f"{what} compares stored results, and the commands of the smooth behaviour "
+                f"{getattr(behaviour, 'name', '')!r} are none of them; learn it by a rule without smooth=True"
+            )
+
+
 def _derive_again(module: nn.Module, _: Any) -> None:
     assert isinstance(module, ResultMemory)
     module.derive()
@@ -102,3 +132,17 @@ def decode(space: Space, levels: Int64[Tensor, "k m"], items: Shaped[Tensor, "k 
         noisy = space.vsa.unbind(items, space.result_encoder.roles[actuator])
         columns.append(stored[values(noisy).index])
     return space.schema.command_values(torch.stack(columns, -1))
+
+
+_REAL = (torch.int8, torch.int32, torch.int64, torch.float32, torch.float64)
+
+
+def check_vector(vsa: VSA, name: str, vector: Tensor) -> None:
+    """Raise `ValueError` unless `vector` can be a program, or a sum of conditions, of this architecture."""
+    if vector.shape != (vsa.dim,):
+        raise ShapeError(f"{name} must be one hypervector [{vsa.dim}]; got shape {tuple(vector.shape)}")
+    kinds = (torch.complex64, torch.complex128) if vsa.dtype.is_complex else (*_REAL, vsa.dtype)
+    if vector.dtype not in kinds:
+        raise ValueError(f"{name} of {vsa} cannot be {vector.dtype}; it is one of {', '.join(map(str, kinds))}")
+    if not vector.isfinite().all():
+        raise ValueError(f"{name} holds values that are not finite")

@@ -19,9 +19,10 @@ class Recall(NamedTuple):
     commands: Float64[Tensor, "batch m"]
     """One command per actuator; NaN where no sensor was observed."""
     similarity: Float[Tensor, "batch"]
-    """Cosine of the unbound, noisy result with the most similar stored result."""
+    """Cosine of the unbound, noisy result with the most similar stored result; of a smooth behaviour, with the smooth
+    result (taking roles as orthogonal)."""
     margin: Float[Tensor, "batch"]
-    """Lead of `similarity` over that of the second most similar result; inf if there is only one."""
+    """Lead of `similarity` over that of the second most similar result; inf if there is only one, or if smooth."""
     familiarity: Float[Tensor, "batch"]
     """Cosine of the condition with the sum of the known conditions."""
     speaker: Int64[Tensor, "batch"] | None = None
@@ -73,15 +74,26 @@ def answer_conditions(
     known: Shaped[Tensor, "d"],
     commands: Float64[Tensor, "k m"],
     conditions: Shaped[Tensor, "batch d"],
+    smooth: bool = False,
 ) -> Recall:
     """The answer to encoded and protected conditions (Algorithm 2, lines 2 to 8).
 
     Args:
-        readout: The program and the items of the clean-up memory.
+        readout: The program and the items of the clean-up memory; if smooth, the roles of the actuators.
         known: The sum of the known conditions.
-        commands: The commands of each item.
+        commands: The commands of each item; if smooth, the lowest and the highest command of each actuator.
         conditions: Encoded and protected conditions.
+        smooth: Whether commands are the scores of the roles, see `Behaviour`, instead of those of the best item.
     """
+    if smooth:
+        scores = readout(conditions)
+        low, high = commands
+        values = torch.minimum(low + (scores.clamp(-1, 1) + 1) / 2 * (high - low), high)
+        noise = readout.noise(conditions)
+        noise = noise if readout.units is None else noise * readout.units.to(torch.float64)
+        similarity = over_lengths(scores.norm(dim=-1), noise).clamp(max=1).to(torch.float32)
+        margin = torch.full_like(similarity, torch.inf)
+        return Recall(values, similarity, margin, familiarity(conditions, known))
     match = readout.match(conditions)
     return Recall(commands[match.index], match.similarity, match.margin, familiarity(conditions, known))
 
@@ -92,11 +104,12 @@ def answer_cells(
     known: Shaped[Tensor, "d"],
     commands: Float64[Tensor, "k m"],
     cells: Shaped[Tensor, "batch w"],
+    smooth: bool = False,
 ) -> Recall:
     """The answer to cells, which `encode` maps to conditions; see `answer_conditions`."""
     # Each block of rows is processed to the end, so that its conditions, in float64, stay in the cache.
     return by_blocks(
-        lambda rows: answer_conditions(readout, known, commands, encode(rows)), cells, row_bytes=8 * len(known)
+        lambda rows: answer_conditions(readout, known, commands, encode(rows), smooth), cells, row_bytes=8 * len(known)
     )
 
 

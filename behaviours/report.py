@@ -1,5 +1,6 @@
-"""What a learning rule did with a demonstration."""
+"""What a learning rule did with demonstrations, in numbers and in words."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,3 +62,9 @@ class LearningReport:
     def to_dict(self) -> dict[str, Any]:
         """The report as plain values, for a file; without `terms` if there are none."""
         return {"rule": self.rule, **self._counts()} | ({"terms": list(self.terms)} if self.terms else {})
+
+
+def name_list(what: str, parts: Sequence[Any], most: int = 6) -> str:
+    """The number of sensors or actuators, and the names of the first few."""
+    names = ", ".join(part.name for part in parts[:most]) + (", ..." if len(parts) > most else "")
+    return f"{len(parts)} {what} ({names})"

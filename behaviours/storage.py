@@ -23,19 +23,26 @@ __all__ = ["FORMAT", "Layout", "check_layout", "error_context", "load_tensors", 
 
 FORMAT = 3
 """The version of the format that is written; format 2 (torchvsa 0.2.0) has no behaviours of some sensors only."""
-READ = (2, FORMAT)
+SMOOTH = 4
+"""The version that is written if it has a smooth behaviour, so that earlier releases refuse the file."""
+READ = (2, FORMAT, SMOOTH)
 """The versions that are read."""
 
 Layout = Mapping[str, tuple[torch.dtype, tuple[int, ...]]]
 """The type and shape of each tensor, by name."""
 
 
-def save_tensors(path: str | Path, kind: str, tensors: Mapping[str, Tensor], about: Mapping[str, Any]) -> Path:
-    """Write tensors and a JSON-able description of the given kind ("bank", "demonstrations") to one file."""
+def save_tensors(
+    path: str | Path, kind: str, tensors: Mapping[str, Tensor], about: Mapping[str, Any], version: int = FORMAT
+) -> Path:
+    """Write tensors and a JSON-able description of the given kind ("bank", "demonstrations") to one file.
+
+    `version` is the lowest version of the format that has all that is in the description.
+    """
     flat = {
         name: tensor.detach().cpu().clone(memory_format=torch.contiguous_format) for name, tensor in tensors.items()
     }
-    head = {"kind": kind, "format": FORMAT, "about": about}
+    head = {"kind": kind, "format": version, "about": about}
     # One metadata entry: safetensors writes several of them in any order.
     text = json.dumps(head | {"checksum": checksum(head, flat)})
     return write_atomically(path, safetensors.torch.save(flat, {"torchvsa": text}))

@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Float64, Int64
 from torch import Tensor
 
 from behaviours.controller import Controller
+from behaviours.memory import require_levels
 from behaviours.parts import Actuator, Sensor
 from behaviours.recall import Recall
 from behaviours.schema import Schema
@@ -111,9 +112,10 @@ def explain(controller: Controller, readings: Any) -> Explanation:
         readings: What the sensors read.
 
     Raises:
-        ValueError: For a controller whose answers depend on the past, and for invalid readings.
+        ValueError: For a controller whose answers depend on the past, for smooth commands, and for invalid readings.
     """
     space = controller.space
+    require_levels("explain", controller.modules())
     if space.encoder.width != space.encoder.sensors or type(controller).start is not Controller.start:
         raise ValueError(
             f"{type(controller).__name__} answers by what it read before; only the answers of controllers without a "

@@ -8,6 +8,7 @@ from torch import Tensor
 
 from behaviours.algebra import stack_programs
 from behaviours.behaviour import Behaviour
+from behaviours.memory import require_levels
 from behaviours.ordered import distinct_rows
 from behaviours.space import check_addable
 from torchvsa import Readout
@@ -27,6 +28,7 @@ def switching_weights(a: Behaviour, b: Behaviour, readings: Any) -> Float64[Tens
     Raises `ValueError` for behaviours that do not add up (other codes, other sensors), and for invalid readings.
     """
     check_addable([a.space, b.space])
+    require_levels("switching_weights", [a, b])
     space = a.space
     results, _ = distinct_rows(torch.cat([a.results, b.results.to(a.results.device)]))
     programs = stack_programs([part.program.detach().to(space.device) for part in (a, b)])

@@ -10,6 +10,7 @@ from torch import Tensor
 from behaviours.algebra import stack_programs
 from behaviours.bank import BehaviourBank
 from behaviours.demonstrations import Demonstrations
+from behaviours.memory import require_levels
 from behaviours.ordered import distinct_rows
 from behaviours.space import conditions_of
 from behaviours.tables import to_int64
@@ -67,6 +68,7 @@ def recognise(bank: BehaviourBank, readings: Any, commands: Any, runs: Any = Non
     if not len(bank):
         raise ValueError("this bank is empty, so that there is no behaviour to recognise")
     space = bank.space
+    require_levels("recognise", [bank[name] for name in bank])
     shown = Demonstrations(readings, commands, schema=space.schema)
     run = torch.zeros(len(shown), dtype=torch.int64) if runs is None else to_int64(runs, "runs")
     if run.shape != (len(shown),):

@@ -12,7 +12,7 @@ from behaviours.algebra import merged_results
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.controller import Controller
-from behaviours.memory import ResultMemory
+from behaviours.memory import ResultMemory, require_levels
 from behaviours.options import as_float
 from behaviours.recall import Recall
 from behaviours.space import conditions_of
@@ -91,7 +91,8 @@ class Policy(Controller):
         )
 
     def joint_memory(self) -> ResultMemory:
-        """The results of all behaviours."""
+        """The results of all behaviours. Raises `ValueError` if one of them is smooth."""
+        require_levels(type(self).__name__, self.parts)
         results = merged_results([term for part in self.parts for term in part.terms])
         return ResultMemory(self.space, results.to(self.space.device))
 

@@ -10,6 +10,7 @@ from behaviours.algebra import stack_programs
 from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition.base import Policy
+from behaviours.memory import require_levels
 from behaviours.recall import Recall, familiarity
 
 
@@ -28,15 +29,16 @@ class Bundle(Policy):
             known conditions and results, but stays in `names`.
 
     Raises:
-        ValueError: For behaviours that use different sensors, for weights that are not finite or are all 0, and for
-            sums with elements that could exceed 2^53, up to which float64 represents all integers, or that are so small
-            that their squares underflow.
+        ValueError: For behaviours that use different sensors, for smooth ones (add them instead), for weights that are
+            not finite or are all 0, and for sums with elements that could exceed 2^53, up to which float64 represents
+            all integers, or that are so small that their squares underflow.
     """
 
     _weights: Tensor
 
     def __init__(self, bank: BehaviourBank, weights: Mapping[str, float] | None = None) -> None:
         super().__init__(bank, bank.names)
+        require_levels("Bundle", self.parts)
         self.weights = self.weights_of(weights)
         """One weight per name."""
         # A buffer is on the device of the programs before it is needed; copying a list there waits for the device.

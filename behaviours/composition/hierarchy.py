@@ -11,6 +11,7 @@ from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.composition.choosing import common_space, naming_space, same_conditions, with_length
 from behaviours.composition.gated import Gated
+from behaviours.memory import require_levels
 from behaviours.recall import Recall
 from behaviours.space import Space
 from torchvsa import VSA
@@ -90,6 +91,7 @@ def _one_shot(vsa: VSA, parts: Sequence[Behaviour], names: Shaped[Tensor, "b d"]
 def _check_chooser(chooser: Behaviour, space: Space, names: Sequence[str]) -> None:
     if not isinstance(chooser, Behaviour):
         raise TypeError(f"chooser is a behaviour that choosing(bank, shown) has learned; got {chooser!r:.80}")
+    require_levels("chooser", [chooser])
     actuators = chooser.space.schema.actuators
     if len(actuators) != 1 or actuators[0].name != "behaviour" or actuators[0].levels != max(len(names), 2):
         raise ValueError(

@@ -15,6 +15,7 @@ from behaviours.learning.base import Rule, continued
 from behaviours.learning.convergence import warn_if_wrong
 from behaviours.learning.pairs import BLOCK, Pairs
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
+from behaviours.memory import require_levels
 from behaviours.options import as_bool, as_float, as_int, set_fields
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
@@ -94,6 +95,7 @@ class ErrorDriven(Rule):
 
         Earlier pairs are not visited again, and these corrections may make them wrong.
         """
+        require_levels("partial_fit", [behaviour])
         samples = Samples.of(behaviour.space, demonstrations, subrange(progress, 0, _ENCODING_SHARE))
         return self._learn(behaviour.space, samples.with_known_results(behaviour.results), behaviour, progress)
 

@@ -13,6 +13,7 @@ from behaviours.learning.base import Rule, continued
 from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.descent import Descent
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
+from behaviours.memory import require_levels
 from behaviours.options import as_bool, as_float, as_int, set_fields
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
@@ -112,6 +113,7 @@ class Gradient(Rule):
         Earlier demonstrations are not trained on again and may be forgotten: take few epochs or a low learning rate.
         Raises `ValueError` unless `output` is `"float"`, since a rounded program cannot follow small steps.
         """
+        require_levels("partial_fit", [behaviour])
         if self.output != "float":
             raise ValueError(
                 f"output={self.output!r} rounds the program, so that small steps are lost; continue with output='float'"

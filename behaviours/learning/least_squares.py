@@ -13,11 +13,11 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
-from behaviours.options import as_float, set_fields
+from behaviours.options import as_bool, as_float, set_fields
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
 from torchvsa import VSA
-from torchvsa._numerics import as_bipolar, is_integer
+from torchvsa._numerics import as_bipolar, is_integer, norms
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,11 @@ class LeastSquares(Rule):
 
     `evidence` makes what was shown often louder: the target scores of a condition that was shown n times are multiplied
     by `1 + evidence · log(1 + n)`. On `silent` conditions all targets are 0.
+
+    `smooth` makes a behaviour whose commands are not rounded to levels (see `Behaviour`): the targets are the mean
+    commands of each condition, on a scale from -1 to 1, and every sample counts. Its report counts as `wrong` the
+    conditions whose command is off by more than half a level. On `silent` conditions it commands the middle of the
+    range.
 
     The closed form needs element-wise binding of real numbers; `fit` raises `ValueError` for other architectures. The
     program is a float vector.
@@ -44,10 +49,21 @@ class LeastSquares(Rule):
     ridge: float = 1e-3
     contradictions: Contradictions | Literal["all"] = "all"
     evidence: float = 0.0
+    smooth: bool = False
 
     def __post_init__(self) -> None:
         check_contradictions(self.contradictions, "all")
-        set_fields(self, ridge=check_ridge(self.ridge), evidence=as_float("evidence", self.evidence, 0))
+        set_fields(
+            self,
+            ridge=check_ridge(self.ridge),
+            evidence=as_float("evidence", self.evidence, 0),
+            smooth=as_bool("smooth", self.smooth),
+        )
+        if self.smooth and (self.contradictions != "all" or self.evidence):
+            raise ValueError(
+                "smooth commands are means over all samples, so that smooth=True takes contradictions='all' and "
+                f"evidence=0; got contradictions={self.contradictions!r} and evidence={self.evidence:g}"
+            )
 
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
@@ -60,13 +76,57 @@ class LeastSquares(Rule):
         Raises `ValueError` for an architecture that is not supported, and for a `ridge` with which the system has no
         solution in floats.
         """
-        return self._learn(space, Samples.of(space, demonstrations, subrange(progress, 0, 0.2)), progress)
+        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2))
+        return (
+            self._learn_smooth(space, shown, demonstrations, progress)
+            if self.smooth
+            else self._learn(space, shown, progress)
+        )
 
     def fit_beside(
         self, space: Space, demonstrations: Demonstrations, silent: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         """Learn a behaviour that is silent where others have an opinion, see `Rule.fit_beside`."""
-        return self._learn(space, Samples.of(space, demonstrations, subrange(progress, 0, 0.2), silent), progress)
+        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2), silent)
+        return (
+            self._learn_smooth(space, shown, demonstrations, progress)
+            if self.smooth
+            else self._learn(space, shown, progress)
+        )
+
+    def _learn_smooth(
+        self, space: Space, samples: Samples, demonstrations: Demonstrations, progress: Progress
+    ) -> Behaviour:
+        actuators, device = space.schema.actuators, samples.condition.device
+        low, high = (
+            torch.tensor([getattr(actuator, end) for actuator in actuators], dtype=torch.float64, device=device)
+            for end in ("low", "high")
+        )
+        shares = 2 * (demonstrations.commands.to(device, torch.float64) - low) / (high - low) - 1
+        counts = torch.bincount(samples.condition).to(torch.float64)
+        targets = torch.zeros(len(counts), len(actuators), dtype=torch.float64, device=device)
+        targets.index_add_(0, samples.condition, shares).div_(counts[:, None])
+        conditions = fitted = samples.conditions[:]
+        wanted, weights = targets, counts
+        if samples.silent is not None:
+            fitted = torch.cat([conditions, samples.silent[:]])
+            wanted = functional.pad(targets, (0, 0, 0, len(samples.silent)))
+            weights = functional.pad(counts, (0, len(samples.silent)), value=1.0)
+        roles = space.result_encoder.roles
+        # Scores are divided by the lengths of the roles.
+        program = solve(
+            space.vsa, fitted, roles, wanted * norms(roles), self.ridge, weights, subrange(progress, 0.2, 0.9)
+        )
+        error = (space.vsa.readout(program, roles)(conditions).clamp(-1, 1) - targets).abs()
+        steps = torch.tensor([actuator.levels - 1 for actuator in actuators], device=device)
+        report = samples.report(
+            self.name,
+            contradicting=int((samples.targets("majority")[samples.condition] != samples.result).sum()),
+            wrong=int((error * steps > 1).any(1).sum()),
+        )
+        progress(1.0)
+        known = samples.condition_sum(space.vsa)
+        return Behaviour(space, program, known, samples.results, report, smooth=True)
 
     def _learn(self, space: Space, shown: Samples, progress: Progress) -> Behaviour:
         samples = shown if self.contradictions == "all" else shown.resolved(self.contradictions)

@@ -11,6 +11,7 @@ from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.pair_accumulator import PairAccumulator
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
+from behaviours.memory import require_levels
 from behaviours.options import as_bool, as_float, set_fields
 from behaviours.ordered import first_rows, in_order_of_appearance
 from behaviours.progress import Progress, no_progress, subrange
@@ -69,6 +70,7 @@ class OneShot(Rule):
         With `contradictions="first"` the bits are those of `fit` on all demonstrations at once. Raises `ValueError` for
         `novelty="exact"`, and for `clip_each_step` with a behaviour that is not clipped.
         """
+        require_levels("partial_fit", [behaviour])
         if self.novelty == "exact":
             raise ValueError(
                 "novelty='exact' needs all earlier conditions, which a behaviour does not keep; continue with "

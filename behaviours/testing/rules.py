@@ -35,10 +35,11 @@ from torchvsa.testing._laws import check, refuses, require, same
 def check_rule(rule: Rule, space: Space | None = None) -> None:
     """Check the laws of learning rules.
 
-    Among the laws: a few unrelated pairs are recalled, in any order of the demonstrations; the counts of the report add
-    up; equal demonstrations give the same bits, with and without gradients; demonstrations, space and rule are not
-    changed; progress rises to 1; `partial_fit` continues as documented or raises `ValueError`; the learned behaviour
-    obeys the laws of `check_policy` that are not about speakers.
+    Among the laws: a few unrelated pairs are recalled (smooth commands up to half a level), in any order of the
+    demonstrations; the counts of the report add up; equal demonstrations give the same bits, with and without
+    gradients; demonstrations, space and rule are not changed; progress rises to 1; `partial_fit` continues as
+    documented or raises `ValueError`; the learned behaviour obeys the laws of `check_policy` that are not about
+    speakers.
 
     Args:
         rule: The rule, with its options.
@@ -143,9 +144,11 @@ def _contradictions_are_resolved_to_a_shown_result(case: Trial) -> None:
     )
     behaviour = case.fit(Demonstrations.join([shown, again]))
     commands = first_step(behaviour, shown.sensors).commands.cpu()
-    resolved = any(torch.equal(commands[0], shown.commands[row]) for row in (0, other))
+    # A smooth behaviour answers with the mean.
+    resolved = behaviour.smooth or any(torch.equal(commands[0], shown.commands[row]) for row in (0, other))
     require(resolved, f"the condition shown with two results recalls neither, but {commands[0].tolist()}")
-    require(torch.equal(commands[1:], shown.commands[1:]), "conditions without contradictions are recalled wrongly")
+    rest = shown.where(torch.arange(len(shown)) > 0)
+    require(recalls_all(behaviour, rest), "conditions without contradictions are recalled wrongly")
     report = behaviour.report
     require(report.contradicting in (1, 2), f"contradicting should be 1 or 2: {report}")
     require(count_samples(report) == report.samples == len(shown) + 2, f"the counts do not add up: {report}")

@@ -25,6 +25,7 @@ MEANINGS = {
     "epochs": "passes over the samples at most",
     "average": "the mean of the program over all visits, instead of the last one",
     "evidence": "how much louder a pair is the more often it was shown: this times log(1 + count)",
+    "smooth": "commands between the levels, where a study asks behaviours one by one",
     "patience": "epochs without progress after which training ends",
     "ridge": "penalty on the program's length",
     "loss": "what gradient descent makes small",

@@ -29,6 +29,7 @@ OPTIONS: list[Rule] = [
     ErrorDriven(average=True),
     ErrorDriven(contradictions="first"),
     LeastSquares(contradictions="majority"),
+    LeastSquares(smooth=True),
     Gradient(epochs=15, sparse=True),
     Gradient(epochs=15, output="int8"),
     Gradient("hinge", epochs=15),
