@@ -11,13 +11,11 @@ from torchvsa._memory_limit import require_memory
 
 
 def quantile_edges(readings: Any, bins: int, weights: Float64[Tensor, "N"] | None = None) -> Float64[Tensor, "edges"]:
-    """The edges `[bins - 1]` that divide readings `[N]` into `bins` bins of nearly equal mass.
+    """The edges `[bins - 1]` that divide readings `[N]` into `bins` bins of nearly equal counts.
 
-    The mass is spread over the rows, so that bins have nearly equal counts; but the share of the commonest value, at
-    most half of the mass, is spread over the distinct values, so that a value that repeats often does not take nearly
-    all of the edges. Each edge is midway between two neighbouring distinct values, so that it always separates some
-    readings from others; edges coincide where there are more bins than distinct values. NaN is ignored; with fewer than
-    two distinct values there are no edges. With `weights` `[N]`, above 0, a row counts that many times.
+    Each edge is midway between two neighbouring values, so that it always separates some readings from others; edges
+    coincide where a value fills more than one bin. NaN is ignored; with fewer than two different values there are no
+    edges. With `weights` `[N]`, above 0, a row counts that many times.
 
     Raises `ValueError` for infinite readings and for fewer than one bin.
     """
@@ -35,14 +33,9 @@ def quantile_edges(readings: Any, bins: int, weights: Float64[Tensor, "N"] | Non
     require_memory(6 * 8 * bins, f"the edges of {bins:,} bins", "take fewer bins")
     if weights is not None:
         counts = _whole(torch.zeros_like(values).index_add_(0, index, weights.to(values)[observed]))
-    # In whole numbers: of N rows and k values, a row has mass (256 - s)·k and a value s·N, which is 256·N·k in all.
-    rows, distinct = int(counts.sum()), len(values)
-    spread = min(_PARTS * int(counts.max()) // rows, _PARTS // 2)
-    by_rows = counts.cumsum(0) * ((_PARTS - spread) * distinct)
-    mass = by_rows + torch.arange(1, distinct + 1, device=values.device) * (spread * rows)
-    share, rest = divmod(_PARTS * rows * distinct, bins)
-    edges = torch.arange(1, bins, device=values.device)
-    # The first value below which the mass is the wanted one.
+    mass, edges = counts.cumsum(0), torch.arange(1, bins, device=values.device)
+    share, rest = divmod(int(mass[-1]), bins)
+    # The first value up to which there are more rows than wanted lies above the edge.
     above = torch.searchsorted(mass, edges * share + edges * rest // bins, right=True).clamp(min=1)
     low, high = values[above - 1], values[above]
     middle = low + (high - low) / 2
@@ -52,10 +45,8 @@ def quantile_edges(readings: Any, bins: int, weights: Float64[Tensor, "N"] | Non
     return torch.where(middle > low, middle, high)
 
 
-_PARTS = 256
-"""The share of the commonest value is rounded down to a multiple of 1 / 256."""
 _WHOLE = 2**26
-"""The mass of all rows if weights are not whole; its products with the number of distinct values stay below 2^63."""
+"""The mass of all rows if weights are not whole."""
 
 
 def _whole(mass: Float64[Tensor, "k"]) -> Int64[Tensor, "k"]:
