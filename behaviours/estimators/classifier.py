@@ -68,7 +68,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         *,
         bins: int = 4096,
         subset: int = 2,
-        epochs: int = 30,
+        epochs: int = 50,
         batch_size: int = 128,
         learning_rate: float = 0.05,
         validation_fraction: float = 0.0,
