@@ -8,14 +8,14 @@ from torchvsa.encoders import Encoder, History, Record, ThresholdFeatures
 from torchvsa.encoders.threshold_features import Kind
 
 
-def default_encoder(schema: Schema, vsa: VSA) -> Encoder:
-    """Threshold features with the kind of each sensor."""
+def default_encoder(schema: Schema, vsa: VSA, bins: int = 256) -> Encoder:
+    """Threshold features with the kind of each sensor, and an even number of bins for the others."""
     # Every threshold separates 0 from 1, so that binary readings count as real ones.
     kinds: list[Kind] = [
         len(sensor.values) if sensor.kind == "categorical" else "angle" if sensor.kind == "angle" else "real"
         for sensor in schema.sensors
     ]
-    return ThresholdFeatures(vsa, len(kinds), bins=256, subset=2, kinds=kinds)
+    return ThresholdFeatures(vsa, len(kinds), bins=bins, subset=2, kinds=kinds)
 
 
 def check_value_bins(schema: Schema, encoder: Encoder) -> None:

@@ -1,6 +1,6 @@
 """The sensors and actuators of a robot, and the validation of its data."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -11,6 +11,7 @@ from torch import Tensor
 
 from behaviours.kinds import canonical, to_unit_interval, valid_readings
 from behaviours.parts import Actuator, Sensor, most_parts
+from behaviours.proposal import propose
 from behaviours.tables import ReadText, column_names, compare_names, to_float64
 from torchvsa import ShapeError
 
@@ -62,6 +63,51 @@ class Schema:
     def from_dict(cls, data: dict[str, Any]) -> "Schema":
         """The inverse of `to_dict`."""
         return cls([Sensor(**s) for s in data["sensors"]], [Actuator(**a) for a in data["actuators"]])
+
+    @classmethod
+    def from_data(
+        cls,
+        data: Any,
+        actuators: Sequence[str] | None = None,
+        sensors: Sequence[str] | None = None,
+        *,
+        by: str | None = None,
+        changes: Mapping[str, Mapping[str, Any] | None] | None = None,
+        show: Callable[[str], object] | None = None,
+    ) -> "Schema":
+        """Propose the schema of recorded data: what each column is, and in which range.
+
+            schema = Schema.from_data(frame, ["v", "omega"], by="run", show=print)
+
+        | a column with | becomes |
+        |---|---|
+        | text of at most 32 different values | a categorical sensor |
+        | only 0 and 1 | a binary sensor |
+        | numbers that fill a turn, and the name of an angle (heading, yaw ...) | an angle |
+        | other numbers | a real sensor that clips, with the range of all but outliers |
+        | one value, none, much text; or numbers that grow from row to row in every run, unless named | nothing |
+
+        Outliers are farther from the middle 98 % of the readings than half of their width. An actuator has the range of
+        its commands; up to 64 evenly spaced commands are its levels.
+
+        Args:
+            data: Anything with named columns: a data frame, a table, a mapping, a `behaviours.data.Log`.
+            actuators: The columns of commands; a `Log` may know them.
+            sensors: The columns of readings, by default all others that can be sensors.
+            by: The column that names the run of each row.
+            changes: Corrections by column: arguments of `Sensor` or `Actuator`, such as `{"kind": "angle", "low": 0,
+                "high": 360}`, or None to leave it out.
+            show: Called with a line of text for each column: what it is taken for, or why it is left out.
+
+        Raises:
+            ValueError: Naming the column, for one that does not exist, text among numbers, infinite readings, commands
+                that are missing or constant, data without rows, and wrong corrections.
+        """
+        found = propose(data, sensors, actuators, by, changes)
+        if show is not None:
+            for line in found.lines():
+                show(line)
+        return cls(found.sensors, found.actuators)
 
     def normalise(self, readings: Any) -> Float64[Tensor, "batch n"]:
         """Map readings to [0, 1], for encoders; NaN (not observed) stays NaN.

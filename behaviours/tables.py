@@ -1,6 +1,6 @@
 """Convert tables of numbers to tensors: tensors, arrays, lists, and data frames with column names."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from numbers import Real
 from typing import Any
@@ -68,6 +68,36 @@ def column_names(values: Any) -> tuple[str, ...] | None:
         return None
     names = list(values.columns) if hasattr(values, "columns") else [getattr(values, "name", None)]
     return checked_names(names, "columns") if any(isinstance(name, str) for name in names) else None
+
+
+def columns_of(data: Any) -> dict[str, np.ndarray[Any, Any]]:
+    """The columns `[N]` of a data frame, a table, or a mapping from names to columns, by name and in order.
+
+    Raises `ValueError` for anything else, for names that are not different strings, and for columns of unequal length.
+    """
+    # A table of pyarrow has its names in `column_names`, a data frame in `columns`, and a mapping as its keys.
+    names = getattr(data, "column_names", getattr(data, "columns", data if isinstance(data, Mapping) else None))
+    if names is None or not hasattr(data, "__getitem__"):
+        raise ValueError(
+            "expected data with named columns: a data frame, a table, or a mapping from names to columns; "
+            f"got {type(data).__name__}"
+        )
+    columns = {name: _column(data[name], name) for name in checked_names(list(names), "the columns of the data")}
+    if not columns:
+        raise ValueError("the data have no columns")
+    if len({len(column) for column in columns.values()}) > 1:
+        lengths = ", ".join(f"{name} {len(column)}" for name, column in columns.items())
+        raise ValueError(f"the columns of the data differ in length: {lengths}")
+    return columns
+
+
+def _column(values: Any, name: str) -> np.ndarray[Any, Any]:
+    if isinstance(values, Tensor):
+        values = values.detach().cpu().numpy()
+    array = np.asarray(_frame_values(values) if hasattr(values, "to_numpy") else values)
+    if array.ndim != 1:
+        raise ValueError(f"column {name!r} must have one value per row; got shape {array.shape}")
+    return array
 
 
 def checked_names(names: Any, what: str) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from experiments import studies
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.run import draw, load
+from experiments.own_robot.command import learn_log
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -25,9 +26,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if name == "draw":
         draw_again(rest)
         return
-    if name in ("ask", "show"):
+    if name in COMMANDS:
         with errors_in_one_line(f"torchvsa {name}"):
-            sys.exit(asked(rest) if name == "ask" else shown(rest))
+            sys.exit(COMMANDS[name](rest))
     if name == "settings":
         print(studies.settings_page(), end="")
         return
@@ -51,6 +52,10 @@ def shown(arguments: Sequence[str]) -> bool:
     for argument in arguments:
         print(show(argument))
     return False
+
+
+COMMANDS = {"learn": learn_log, "ask": asked, "show": shown}
+"""What works with files; each returns the exit status."""
 
 
 def corral() -> None:
@@ -80,6 +85,7 @@ def print_commands(console: Console) -> None:
         table.add_row(name, study.about)
     table.add_row("ask BANK [NAME]", "Answer rows of readings: CSV from a pipe, CSV with commands out.")
     table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
+    table.add_row("learn LOG", "Learn a behaviour from a log, compare it by run, and write a bank and a page.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)

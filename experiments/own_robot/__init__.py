@@ -1,0 +1,1 @@
+"""A robot of the reader: from its log to a bank and a page."""

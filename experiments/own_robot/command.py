@@ -1,0 +1,68 @@
+"""The command `torchvsa learn`."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Sequence
+
+from rich.console import Console
+
+from behaviours.commands.learn import Learned, learn, options_of, proposed, score_rows
+from behaviours.progress import Progress
+from experiments.kit.columns import Column, Table
+
+
+def learn_log(arguments: Sequence[str]) -> int:
+    """Learn a log as the arguments of the command line say, and print how well; or only propose its schema."""
+    options = options_of(arguments)
+    if options.propose is not None:
+        print(f"{proposed(options)} says what each column is; correct it, and learn with --schema {options.propose}")
+        return 0
+    learned = learn(options, shown_progress)
+    console = Console()
+    if not console.is_terminal:
+        console.width = 150
+    console.print(score_table(learned).terminal())
+    written = str(options.output)
+    if options.page is not None:
+        from experiments.own_robot.page import write_page  # which imports what draws
+
+        written += f" and {write_page(learned, options.page)}"
+    print(f"{written} written; answer rows with: torchvsa ask {options.output}")
+    return 0
+
+
+def shown_progress(what: str) -> Progress:
+    """Progress of a part of the work on stderr: one line on a terminal, otherwise a line for each tenth."""
+    began, told = time.monotonic(), -1
+    terminal = sys.stderr.isatty()
+
+    def show(fraction: float) -> None:
+        nonlocal told
+        step = int((100 if terminal else 10) * fraction + 1e-9)
+        if step == told:
+            return
+        told = step
+        line = f"{what}: {fraction:4.0%}, {time.monotonic() - began:.0f} s"
+        print(f"\r{line}" if terminal else line, end="\n" if not terminal or fraction >= 1 else "", file=sys.stderr)
+        sys.stderr.flush()
+
+    show(0.0)
+    return show
+
+
+def score_table(learned: Learned) -> Table:
+    """The error of each model by actuator, and for commands of few levels how often the level is right."""
+    columns = [Column("model")]
+    for actuator in learned.schema.actuators:
+        unit = f" {actuator.unit}" if actuator.unit else ""
+        about = f"mean absolute error of `{actuator.name}`{unit}, in runs that were not shown"
+        columns.append(Column(actuator.name, f"{actuator.name}: error", ".4f", best="min", about=about))
+    for actuator in learned.schema.actuators:
+        about = f"how often `{actuator.name}` has the demonstrated one of its {actuator.levels} levels"
+        key = f"{actuator.name} agreement"
+        columns.append(Column(key, f"{actuator.name}: agreement", ".3f", best="max", about=about))
+    what = "runs" if learned.by else "stretches of time"
+    caption = f"Each model answers {what} that it was not shown; the best of each column is marked."
+    return Table("What each model commands", columns, caption).show(score_rows(learned))
