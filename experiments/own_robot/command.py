@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from rich.console import Console
 
-from behaviours.commands.learn import Learned, learn, options_of, proposed, score_rows
+from behaviours.commands.learn import learn, options_of, proposed
 from behaviours.progress import Progress
-from experiments.kit.columns import Column, Table
+from experiments.own_robot.tables import score_table
 
 
 def learn_log(arguments: Sequence[str]) -> int:
@@ -50,19 +50,3 @@ def shown_progress(what: str) -> Progress:
 
     show(0.0)
     return show
-
-
-def score_table(learned: Learned) -> Table:
-    """The error of each model by actuator, and for commands of few levels how often the level is right."""
-    columns = [Column("model")]
-    for actuator in learned.schema.actuators:
-        unit = f" {actuator.unit}" if actuator.unit else ""
-        about = f"mean absolute error of `{actuator.name}`{unit}, in runs that were not shown"
-        columns.append(Column(actuator.name, f"{actuator.name}: error", ".4f", best="min", about=about))
-    for actuator in learned.schema.actuators:
-        about = f"how often `{actuator.name}` has the demonstrated one of its {actuator.levels} levels"
-        key = f"{actuator.name} agreement"
-        columns.append(Column(key, f"{actuator.name}: agreement", ".3f", best="max", about=about))
-    what = "runs" if learned.by else "stretches of time"
-    caption = f"Each model answers {what} that it was not shown; the best of each column is marked."
-    return Table("What each model commands", columns, caption).show(score_rows(learned))
