@@ -27,7 +27,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         draw_again(rest)
         return
     if name in COMMANDS:
-        with errors_in_one_line(f"torchvsa {name}"):
+        with errors_in_one_line(f"torchvsa {name}", "stopped"):
             sys.exit(COMMANDS[name](rest))
     if name == "settings":
         print(studies.settings_page(), end="")

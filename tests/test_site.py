@@ -13,7 +13,7 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 from docstrings import converted  # noqa: E402 (of the site)
 
-PAGES = ["start", "how", "architectures", "estimators", "smooth"]
+PAGES = ["start", "how", "own-robot", "architectures", "estimators", "smooth"]
 
 
 @pytest.mark.parametrize("page", PAGES)

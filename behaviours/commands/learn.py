@@ -7,14 +7,24 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
-import torch
 
 from behaviours.bank import BehaviourBank
 from behaviours.commands.schema_file import read_schema, write_schema
-from behaviours.commands.validate import Validation, cross_validate, default_rule, folds_of, sweep
+from behaviours.commands.validate import (
+    LEVELS,
+    SMOOTH,
+    Validation,
+    cross_validate,
+    default_rule,
+    folds_of,
+    is_smooth,
+    space_of,
+    sweep,
+    taught,
+    thinned,
+)
 from behaviours.data.log import Log
 from behaviours.data.reading import read
-from behaviours.default_encoder import default_encoder
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning import no_convergence_warnings
 from behaviours.options import as_int
@@ -22,10 +32,8 @@ from behaviours.progress import Progress, no_progress
 from behaviours.proposal import propose
 from behaviours.report import LearningReport
 from behaviours.schema import Schema
-from behaviours.space import Space
-from torchvsa import MAP
 
-VALIDATED = 20_000
+VALIDATED = 10_000
 """Scores are measured with at most this many rows, evenly spread over the log: more hardly change them."""
 
 
@@ -42,6 +50,7 @@ class Options:
     output: Path
     page: Path | None
     name: str
+    commands: str
     dim: int
     seed: int
 
@@ -58,6 +67,8 @@ class Learned:
     shown: Demonstrations
     report: LearningReport
     validation: Validation
+    kind: str
+    """Whether its commands are levels or smooth, as `behaviours.commands.validate.OURS` names them."""
     by_size: list[dict[str, Any]]
     """The errors by dimensions and bins, see `sweep`."""
 
@@ -79,15 +90,23 @@ def options_of(arguments: Sequence[str]) -> Options:
     parser.add_argument("--page", type=Path, help="default: the output with the suffix .html")
     parser.add_argument("--no-page", action="store_true", help="learn and compare only, which is faster")
     parser.add_argument("--name", help="of the behaviour; default: that of the log")
+    kinds = "auto", "levels", "smooth"
+    parser.add_argument("--commands", choices=kinds, default="auto", help="default: the better of levels and smooth")
     parser.add_argument("--dim", type=int, default=4000, help="elements of the hypervector; default: %(default)s")
     parser.add_argument("--seed", type=int, default=0, help="of codebooks and training; default: %(default)s")
     given = parser.parse_args(arguments)
     if given.schema is not None and (given.sensors or given.actuators):
         raise ValueError("--schema names sensors and actuators; leave out --sensors and --actuators")
     page = None if given.no_page else given.page or given.output.with_suffix(".html")
+    for path in (given.propose, given.output, page):
+        if path is not None and not path.absolute().parent.is_dir():
+            raise FileNotFoundError(f"cannot write {path}: there is no such folder")
+        if path is not None and path.absolute() == given.log.absolute():
+            raise ValueError(f"{path} is the log itself; write to another file")
     return Options(
         given.log, _names(given.sensors), _names(given.actuators), given.by, given.schema, given.propose, given.output,
-        page, given.name or given.log.stem, as_int("--dim", given.dim, 1), as_int("--seed", given.seed, 0),
+        page, given.name or given.log.stem, given.commands, as_int("--dim", given.dim, 1),
+        as_int("--seed", given.seed, 0),
     )  # fmt: skip
 
 
@@ -134,15 +153,28 @@ def learn(options: Options, progress: Callable[[str], Progress] = lambda what: n
     shown, blind = _observed(shown)
     if blind:
         notes.append(f"{blind} rows without any reading: left out")
-    some = _thinned(shown)
+    some = thinned(shown, VALIDATED)
     folds = folds_of(some, by or ("episode" if len(shown.episodes.unique()) > 1 else None))
-    bank = BehaviourBank(Space(schema, default_encoder(schema, MAP(options.dim, dtype=torch.int8)), seed=options.seed))
-    report = bank.learn(options.name, shown, default_rule(len(shown)), progress(f"learn {len(shown):,} rows"))
-    bank.save(options.output)
+    space = space_of(schema, options.dim, options.seed)
+    kinds = _kinds(options.commands, schema, shown)
     held = f"hold out {'runs' if by else 'stretches of time'}, {len(np.unique(folds))} times"
-    validation = cross_validate(schema, some, folds, options.seed, progress(held))
-    by_size = [] if options.page is None else sweep(schema, some, folds, options.seed, progress("vary d and bins"))
-    return Learned(options, schema, by, notes, shown, report, validation, by_size)
+    validation = cross_validate(space, some, folds, kinds, progress(held))
+    kind = min(kinds, key=lambda kind: validation.relative(kind, schema))
+    given = taught(kind, shown)
+    bank = BehaviourBank(space)
+    report = bank.learn(options.name, given, default_rule(kind, len(shown)), progress(f"learn {len(given):,} rows"))
+    bank.save(options.output)
+    if len(given) < len(shown):
+        notes.append(f"smooth commands: learned from {len(given):,} rows, evenly spread over the log")
+    by_size = [] if options.page is None else sweep(space, some, folds, kind, progress("vary d and bins"))
+    return Learned(options, schema, by, notes, shown, report, validation, kind, by_size)
+
+
+def _kinds(commands: str, schema: Schema, shown: Demonstrations) -> list[str]:
+    """The kinds of commands that are compared; the first is taken if they are equally good."""
+    if commands != "auto":
+        return [{"levels": LEVELS, "smooth": SMOOTH}[commands]]
+    return [LEVELS, SMOOTH] if is_smooth(schema, shown) else [LEVELS]
 
 
 def _by(log: Log, by: str | None) -> str | None:
@@ -157,14 +189,6 @@ def _observed(shown: Demonstrations) -> tuple[Demonstrations, int]:
     if blind.all():
         raise ValueError("no row has any reading; all fields of the sensors are empty")
     return (shown.where(~blind), int(blind.sum())) if blind.any() else (shown, 0)
-
-
-def _thinned(shown: Demonstrations) -> Demonstrations:
-    if len(shown) <= VALIDATED:
-        return shown
-    keep = torch.zeros(len(shown), dtype=torch.bool)
-    keep[torch.linspace(0, len(shown) - 1, VALIDATED, dtype=torch.float64).long()] = True
-    return shown.where(keep)
 
 
 def score_rows(learned: Learned) -> list[dict[str, Any]]:

@@ -1,6 +1,6 @@
 """Cross-validation of a behaviour by run, beside scikit-learn's models."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,13 +13,15 @@ from behaviours.bank import BehaviourBank
 from behaviours.behaviour import Behaviour
 from behaviours.default_encoder import default_encoder
 from behaviours.demonstrations import Demonstrations
-from behaviours.learning import Gradient, Rule, no_convergence_warnings
+from behaviours.learning import Gradient, LeastSquares, Rule, no_convergence_warnings
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.schema import Schema
 from behaviours.space import Space
 from torchvsa import MAP
 
-OURS = "one hypervector"
+LEVELS, SMOOTH = "one hypervector", "one hypervector, smooth"
+OURS = (LEVELS, SMOOTH)
+"""A command is one of the levels, which `Gradient` learns as classes; or any value, which `LeastSquares` fits."""
 RIVALS = ("nearest neighbours", "decision tree", "mean")
 FOLDS = 5
 _BATCH = 1024
@@ -28,6 +30,10 @@ _FEW_RESULTS = 20
 """Up to this many different results, commands are classes rather than amounts, and the rivals are classifiers."""
 _ROW_EPOCHS = 6_000_000
 """Rows times epochs: one thread trains about 40,000 a second, so that this takes minutes."""
+_SMOOTH_ROWS = 200_000
+"""Smooth commands are learned from at most this many rows, evenly spread: one thread fits 2,000 a second."""
+_RIDGE = 0.1
+"""Of smooth commands: noisy demonstrations need more than exact ones."""
 
 Answer = Callable[[Float64[torch.Tensor, "B n"]], NDArray[np.float64]]
 
@@ -40,12 +46,16 @@ class Validation:
     predicted: dict[str, Float64[np.ndarray, "N m"]]
     unfamiliar: Bool[np.ndarray, "N"]
     """Whether the readings resemble the demonstrated ones less than nearly all of these resemble themselves."""
-    margin: Float64[np.ndarray, "N"]
     folds: Int64[np.ndarray, "N"]
 
     def errors(self, model: str) -> Float64[np.ndarray, "N m"]:
         """The absolute error of each command, in its unit."""
         return np.abs(self.predicted[model] - self.shown.commands.numpy())
+
+    def relative(self, model: str, schema: Schema) -> float:
+        """The mean absolute error relative to the range of each actuator."""
+        ranges = np.array([actuator.high - actuator.low for actuator in schema.actuators])
+        return float((self.errors(model) / ranges).mean())
 
     def agreement(self, model: str, schema: Schema) -> Bool[np.ndarray, "N m"]:
         """Whether each command has the level of the demonstrated one."""
@@ -54,9 +64,36 @@ class Validation:
         return (schema.command_levels(given) == schema.command_levels(self.shown.commands)).numpy()
 
 
-def default_rule(rows: int) -> Rule:
-    """The rule that `torchvsa learn` uses: fewer epochs for very many rows, of which each epoch shows more."""
+def default_rule(kind: str, rows: int) -> Rule:
+    """The rule that `torchvsa learn` uses for levels or smooth commands.
+
+    Levels get fewer epochs for very many rows, of which each epoch shows more.
+    """
+    if kind == SMOOTH:
+        return LeastSquares(smooth=True, ridge=_RIDGE)
     return Gradient(sparse=True, epochs=min(Gradient.epochs, max(3, _ROW_EPOCHS // rows)))
+
+
+def taught(kind: str, shown: Demonstrations) -> Demonstrations:
+    """The rows that are learned from: all, or evenly spread ones if there are too many for smooth commands."""
+    return thinned(shown, _SMOOTH_ROWS) if kind == SMOOTH else shown
+
+
+def thinned(shown: Demonstrations, most: int) -> Demonstrations:
+    """At most this many rows, evenly spread."""
+    if len(shown) <= most:
+        return shown
+    keep = torch.zeros(len(shown), dtype=torch.bool)
+    keep[torch.linspace(0, len(shown) - 1, most, dtype=torch.float64).long()] = True
+    return shown.where(keep)
+
+
+def is_smooth(schema: Schema, shown: Demonstrations) -> bool:
+    """Whether commands have values between the levels of their actuator."""
+    return any(
+        len(column.unique()) > actuator.levels
+        for actuator, column in zip(schema.actuators, shown.commands.T, strict=True)
+    )
 
 
 def folds_of(shown: Demonstrations, by: str | None) -> Int64[np.ndarray, "N"]:
@@ -78,57 +115,70 @@ def folds_of(shown: Demonstrations, by: str | None) -> Int64[np.ndarray, "N"]:
 
 
 def cross_validate(
-    schema: Schema, shown: Demonstrations, folds: Int64[np.ndarray, "N"], seed: int, progress: Progress = no_progress
+    space: Space,
+    shown: Demonstrations,
+    folds: Int64[np.ndarray, "N"],
+    kinds: Sequence[str],
+    progress: Progress = no_progress,
 ) -> Validation:
     """Learn all folds but one, and ask for the commands of the remaining one; likewise for each fold and model."""
-    count = len(np.unique(folds))
-    predicted = {name: np.empty(tuple(shown.commands.shape)) for name in (OURS, *RIVALS)}
-    unfamiliar, margin = np.zeros(len(shown), dtype=np.bool_), np.zeros(len(shown))
+    schema, count = space.schema, len(np.unique(folds))
+    predicted = {name: np.empty(tuple(shown.commands.shape)) for name in (*kinds, *RIVALS)}
+    unfamiliar = np.zeros(len(shown), dtype=np.bool_)
     for number, (train, test) in enumerate(_splits(folds)):
         part, rest = shown.where(train), shown.where(test)
-        behaviour = learned(Space(schema, seed=seed), part, subrange(progress, number / count, (number + 0.9) / count))
-        predicted[OURS][test], familiarity, margin[test] = answers(behaviour, rest.sensors)
-        unfamiliar[test] = familiarity < (behaviour.threshold or 0.0)
-        for name, answer in rivals(schema, part, seed).items():
+        for place, kind in enumerate(kinds):
+            began = number + 0.9 * place / len(kinds)
+            behaviour = learned(
+                space, part, kind, subrange(progress, began / count, (began + 0.9 / len(kinds)) / count)
+            )
+            predicted[kind][test], familiarity = answers(behaviour, rest.sensors)
+            unfamiliar[test] = familiarity < (behaviour.threshold or 0.0)
+        for name, answer in rivals(schema, part, space.seed).items():
             predicted[name][test] = answer(rest.sensors)
         progress((number + 1) / count)
-    return Validation(shown, predicted, unfamiliar, margin, folds)
+    return Validation(shown, predicted, unfamiliar, folds)
 
 
 def sweep(
-    schema: Schema, shown: Demonstrations, folds: Int64[np.ndarray, "N"], seed: int, progress: Progress = no_progress
+    space: Space, shown: Demonstrations, folds: Int64[np.ndarray, "N"], kind: str, progress: Progress = no_progress
 ) -> list[dict[str, Any]]:
     """The mean absolute error of each actuator in the first fold, by dimensions and bins of the encoder."""
     settings = [(dim, 256) for dim in (500, 1000, 2000, 4000, 8000)] + [(4000, bins) for bins in (8, 32, 1024)]
     train, rest = map(shown.where, next(_splits(folds)))
     rows = []
     for number, (dim, bins) in enumerate(settings):
-        space = Space(schema, default_encoder(schema, MAP(dim, dtype=torch.int8), bins), seed=seed)
-        behaviour = learned(space, train)
+        behaviour = learned(space_of(space.schema, dim, space.seed, bins), train, kind)
         errors = np.abs(answers(behaviour, rest.sensors)[0] - rest.commands.numpy()).mean(0)
-        names = [actuator.name for actuator in schema.actuators]
+        names = [actuator.name for actuator in space.schema.actuators]
         rows.append({"dim": dim, "bins": bins} | dict(zip(names, errors.tolist(), strict=True)))
         progress((number + 1) / len(settings))
     return sorted(rows, key=lambda row: (row["bins"] != 256, row["dim"], row["bins"]))
 
 
+def space_of(schema: Schema, dim: int, seed: int, bins: int = 256) -> Space:
+    """The space with the default encoder, over int8."""
+    return Space(schema, default_encoder(schema, MAP(dim, dtype=torch.int8), bins), seed=seed)
+
+
 @no_convergence_warnings()
-def learned(space: Space, shown: Demonstrations, progress: Progress = no_progress) -> Behaviour:
+def learned(space: Space, shown: Demonstrations, kind: str, progress: Progress = no_progress) -> Behaviour:
     """A calibrated behaviour, with the default rule."""
     bank = BehaviourBank(space)
-    bank.learn("learned", shown, default_rule(len(shown)), progress)
+    bank.learn("learned", taught(kind, shown), default_rule(kind, len(shown)), progress)
     return bank["learned"]
 
 
 def answers(behaviour: Behaviour, readings: Float64[torch.Tensor, "B n"]) -> tuple[NDArray[np.float64], ...]:
-    """Commands `[B, m]`, familiarity and margin `[B]`; rows in which nothing was observed are not familiar."""
+    """Commands `[B, m]` and familiarity `[B]`; rows in which nothing was observed are not familiar."""
     with torch.no_grad():
         recalls = [behaviour(rows) for rows in readings.split(_BATCH)]
-    found = (torch.cat([getattr(r, name) for r in recalls]) for name in ("commands", "familiarity", "margin"))
-    commands, familiarity, margin = (values.double().numpy() for values in found)
+    commands, familiarity = (
+        torch.cat([getattr(recall, name) for recall in recalls]).double().numpy()
+        for name in ("commands", "familiarity")
+    )
     middle = np.array([(part.low + part.high) / 2 for part in behaviour.space.schema.actuators])
-    blind = np.isnan(commands)
-    return np.where(blind, middle, commands), np.nan_to_num(familiarity), np.nan_to_num(margin, posinf=1e6)
+    return np.where(np.isnan(commands), middle, commands), np.nan_to_num(familiarity)
 
 
 def rivals(schema: Schema, shown: Demonstrations, seed: int) -> dict[str, Answer]:

@@ -11,6 +11,7 @@ from torch.nn import functional
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
+from behaviours.learning.conditions import LazyConditions
 from behaviours.learning.convergence import FEW, warn_if_wrong
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import as_bool, as_float, set_fields
@@ -106,10 +107,10 @@ class LeastSquares(Rule):
         counts = torch.bincount(samples.condition).to(torch.float64)
         targets = torch.zeros(len(counts), len(actuators), dtype=torch.float64, device=device)
         targets.index_add_(0, samples.condition, shares).div_(counts[:, None])
-        conditions = fitted = samples.conditions[:]
+        conditions = fitted = samples.conditions
         wanted, weights = targets, counts
         if samples.silent is not None:
-            fitted = torch.cat([conditions, samples.silent[:]])
+            fitted = torch.cat([conditions[:], samples.silent[:]])
             wanted = functional.pad(targets, (0, 0, 0, len(samples.silent)))
             weights = functional.pad(counts, (0, len(samples.silent)), value=1.0)
         roles = space.result_encoder.roles
@@ -117,12 +118,13 @@ class LeastSquares(Rule):
         program = solve(
             space.vsa, fitted, roles, wanted * norms(roles), self.ridge, weights, subrange(progress, 0.2, 0.9)
         )
-        error = (space.vsa.readout(program, roles)(conditions).clamp(-1, 1) - targets).abs()
+        readout = space.vsa.readout(program, roles)
+        commanded = torch.cat([readout(rows).clamp(-1, 1) for rows in conditions.split(_ROWS)])
         steps = torch.tensor([actuator.levels - 1 for actuator in actuators], device=device)
         report = samples.report(
             self.name,
             contradicting=int((samples.targets("majority")[samples.condition] != samples.result).sum()),
-            wrong=int((error * steps > 1).any(1).sum()),
+            wrong=int(((commanded - targets).abs() * steps > 1).any(1).sum()),
         )
         progress(1.0)
         known = samples.condition_sum(space.vsa)
@@ -135,14 +137,15 @@ class LeastSquares(Rule):
         counts = torch.bincount(cells, minlength=shape[0] * shape[1]).view(shape).to(torch.float64)
         items = space.items(samples.results)
         targets = counts / counts.sum(1, keepdim=True) * (1 + self.evidence * samples.evidence()[:, None])
-        conditions = fitted = samples.conditions[:]
+        conditions = fitted = samples.conditions
         if samples.silent is not None:
-            fitted = torch.cat([conditions, samples.silent[:]])
+            fitted = torch.cat([conditions[:], samples.silent[:]])
             targets = functional.pad(targets, (0, 0, 0, len(samples.silent)))
         every = samples.items(space)
         targets = functional.pad(targets, (0, len(every) - len(items)))
         program = solve(space.vsa, fitted, every, targets, self.ridge, progress=subrange(progress, 0.2, 0.9))
-        predicted = space.vsa.readout(program, items)(conditions).argmax(1)
+        readout = space.vsa.readout(program, items)
+        predicted = torch.cat([readout(rows).argmax(1) for rows in conditions.split(_ROWS)])
         report = samples.report(
             self.name,
             contradicting=int((counts.argmax(1)[shown.condition] != shown.result).sum()),
@@ -172,9 +175,13 @@ class LeastSquares(Rule):
         )
 
 
+_ROWS = 4096
+"""So many conditions are held as floats at once."""
+
+
 def solve(
     vsa: VSA,
-    conditions: Shaped[Tensor, "k d"],
+    conditions: Shaped[Tensor, "k d"] | LazyConditions,
     items: Shaped[Tensor, "r d"],
     targets: Float64[Tensor, "k r"],
     ridge: float,
@@ -188,7 +195,7 @@ def solve(
 
     Args:
         vsa: The architecture of the hypervectors.
-        conditions: The conditions c.
+        conditions: The conditions c; those that are encoded on access are not held at once in the primal form.
         items: The hypervectors r that they are bound with.
         targets: The target score of each pair.
         ridge: The weight of the squared length of p, above 0.
@@ -206,26 +213,38 @@ def solve(
             "Gradient"
         )
     # Sums of fewer than 2^24 products of -1 and +1 are exact in float32, which is twice as fast.
-    exact = is_integer(conditions) and is_integer(items)
-    c, r = (as_bipolar(x).to(torch.float32 if exact else torch.float64) for x in (conditions, items))
-    pairs = len(c) * len(r)
-    weight = ridge * float((c.double() ** 2).sum(0) @ (r.double() ** 2).sum(0)) / pairs
-    if weights is not None and not (weights == 1).all():
-        # A row of weight w is √w times as long.
-        roots = weights.sqrt()[:, None]
-        c, targets = roots * c, roots * targets
+    kind = torch.float32 if is_integer(conditions[:1]) and is_integer(items) else torch.float64
+    r = as_bipolar(items).to(kind)
+    pairs = len(conditions) * len(r)
+    if weights is None:
+        weights = torch.ones(len(conditions), dtype=torch.float64, device=r.device)
     if pairs <= vsa.dim:
-        rows = (c[:, None] * r).flatten(0, 1)
-        system = (rows @ rows.T).double()
+        rows = (as_bipolar(conditions[:]).to(kind)[:, None] * r).flatten(0, 1)
+        weight = ridge * float((rows.double() ** 2).sum()) / pairs
+        # A row of weight w is √w times as long.
+        roots = weights.sqrt().repeat_interleave(len(r))
+        system = (rows @ rows.T).double() * roots[:, None] * roots
         system.diagonal().add_(weight)
         progress(0.4)
-        program = rows.double().T @ _solve_positive_definite(system, targets.reshape(-1), ridge)
+        solution = _solve_positive_definite(system, roots * targets.reshape(-1), ridge)
+        program = rows.double().T @ (roots * solution)
     else:
-        # Element-wise binding makes the d × d matrix of all pairs a product of two small ones.
-        system = ((c.T @ c) * (r.T @ r)).double()
-        system.diagonal().add_(weight)
-        progress(0.4)
-        program = _solve_positive_definite(system, (c.double() * (targets @ r.double())).sum(0), ridge)
+        # Element-wise binding makes the d × d matrix of all pairs a product of two small ones. It is a sum over the
+        # conditions, which need not be held at once.
+        covariance = torch.zeros(vsa.dim, vsa.dim, dtype=torch.float64, device=r.device)
+        moment, squares = (torch.zeros(vsa.dim, dtype=torch.float64, device=r.device) for _ in range(2))
+        done = 0
+        for part in conditions.split(_ROWS):
+            c, here = as_bipolar(part).to(kind), slice(done, done + len(part))
+            weighted = weights[here, None].to(kind) * c
+            covariance += (c.T @ weighted).double()
+            moment += (weighted.double() * (targets[here] @ r.double())).sum(0)
+            squares += (c.double() ** 2).sum(0)
+            done += len(part)
+            progress(0.4 * done / len(conditions))
+        system = covariance.mul_((r.T @ r).double())
+        system.diagonal().add_(ridge * float(squares @ (r.double() ** 2).sum(0)) / pairs)
+        program = _solve_positive_definite(system, moment, ridge)
     progress(1.0)
     program = program.to(torch.float64 if vsa.dtype == torch.float64 else torch.float32)
     if not program.isfinite().all():

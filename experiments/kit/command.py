@@ -134,7 +134,7 @@ def _defaults(cls: type, package: str = "") -> Iterator[dict[str, Any]]:
 
 
 @contextmanager
-def errors_in_one_line(name: str) -> Iterator[None]:
+def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes on from here") -> Iterator[None]:
     """What the user can mend is told in one line on stderr, with exit status 1; an interrupt in one line with 130.
 
     With HYDRA_FULL_ERROR=1 in the environment the whole traceback is shown instead.
@@ -144,9 +144,9 @@ def errors_in_one_line(name: str) -> Iterator[None]:
     try:
         yield
     except KeyboardInterrupt:
-        print(f"{name}: stopped; the same command goes on from here", file=sys.stderr)
+        print(f"{name}: {stopped}", file=sys.stderr)
         sys.exit(130)
-    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError) as error:
+    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError) as error:
         if TRACEBACK_WANTED:
             raise
         print(f"{name}: {in_words(error)}", file=sys.stderr)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
+from behaviours import Actuator, Sensor
 from behaviours.commands.learn import Learned, score_rows
-from behaviours.commands.validate import OURS, RIVALS
+from behaviours.commands.validate import RIVALS, SMOOTH
 from experiments.kit.columns import Column, Table
 from experiments.kit.figures import legend_below, lines
 from experiments.kit.page import Page, Section
@@ -30,7 +31,8 @@ def write_page(learned: Learned, path: Path) -> Path:
     about = len(learned.shown), len(learned.schema.sensors), len(learned.schema.actuators)
     page.lead = (
         f"{about[0]:,} rows of {about[1]} sensors and {about[2]} actuators became one hypervector of "
-        f"{learned.options.dim:,} elements. Each figure below is about rows of {_held(learned)} that were not shown."
+        f"{learned.options.dim:,} elements; its commands are {'smooth' if learned.kind == SMOOTH else 'levels'}. Each "
+        f"figure below is about rows of {_held(learned)} that were not shown."
     )
     _scores(page.section("Scores"), learned)
     _next(page.section("What to demonstrate next"), learned)
@@ -49,7 +51,7 @@ def headline(learned: Learned) -> str:
     parts = []
     for actuator in learned.schema.actuators:
         rival = min(RIVALS, key=lambda name: rows[name][actuator.name])
-        mine, theirs = rows[OURS][actuator.name], rows[rival][actuator.name]
+        mine, theirs = rows[learned.kind][actuator.name], rows[rival][actuator.name]
         parts.append(f"{with_unit(actuator)} is off by {mine:.3g} on average ({rival}: {theirs:.3g})")
     return f"In {_held(learned)} that were not shown, {'; '.join(parts)}."
 
@@ -69,7 +71,7 @@ def _scores(section: Section, learned: Learned) -> None:
                 *(
                     Column(f"{model} {actuator.name}", f"{actuator.name}: {model}", ".3g", best="min")
                     for actuator in learned.schema.actuators
-                    for model in (OURS, *RIVALS)
+                    for model in (learned.kind, *RIVALS)
                 ),
             ],
             "Mean absolute error in each of them, while the model was learned from the others.",
@@ -99,14 +101,16 @@ def _next(section: Section, learned: Learned) -> None:
 def _regions(section: Section, learned: Learned) -> None:
     frame = regions(learned)
     section.text(
-        f"Each panel divides the readings of a sensor into at most {REGIONS} regions with equally many rows. Where the line "
-        "is above that of the nearest neighbours, the behaviour errs more than they do."
+        f"Each panel divides the readings of a sensor into at most {REGIONS} regions with equally many rows. Where the "
+        "line is above that of the nearest neighbours, the behaviour errs more than they do."
     )
     names = [sensor.name for sensor in learned.schema.sensors]
     actuators = [actuator.name for actuator in learned.schema.actuators]
     shown = max(1, _MOST_PANELS // len(actuators))
     if len(names) > shown:
-        largest = frame.loc[frame["model"] == OURS].groupby("sensor")["share"].max().sort_values(ascending=False)
+        largest = (
+            frame.loc[frame["model"] == learned.kind].groupby("sensor")["share"].max().sort_values(ascending=False)
+        )
         names = [name for name in names if name in largest.index[:shown]]
         section.text(f"Only the {shown} sensors with the largest differences are shown; the CSV file has all of them.")
     part = frame.loc[frame["sensor"].isin(names)]
@@ -123,15 +127,13 @@ def _draw_regions(frame: pd.DataFrame, names: list[str], actuators: list[str]) -
     from matplotlib.figure import Figure
 
     width, height = _PANEL
-    figure = Figure(
-        figsize=(max(1 + width * len(names), 5.4), 0.8 + height * len(actuators)), layout="constrained"
-    )
+    figure = Figure(figsize=(max(1 + width * len(names), 5.4), 0.8 + height * len(actuators)), layout="constrained")
     grid = figure.subplots(len(actuators), len(names), squeeze=False, sharey="row", sharex="col")
     for row, actuator in enumerate(actuators):
         for place, sensor in enumerate(names):
             axes = grid[row, place]
             here = frame.loc[(frame["sensor"] == sensor) & (frame["actuator"] == actuator)]
-            lines(axes, here, "reading", "error", "model", order=[OURS, *RIVALS[:2]])
+            lines(axes, here, "reading", "error", "model", order=[frame["model"].iloc[0], *RIVALS[:2]])
             labels = here.drop_duplicates("reading")
             if (labels["label"] != "").any():
                 axes.set_xticks(labels["reading"], labels["label"], rotation=30, ha="right")
@@ -145,10 +147,10 @@ def _draw_regions(frame: pd.DataFrame, names: list[str], actuators: list[str]) -
 
 def _unfamiliar(section: Section, learned: Learned) -> None:
     validation = learned.validation
-    strange, errors = validation.unfamiliar, validation.errors(OURS)
+    strange, errors = validation.unfamiliar, validation.errors(learned.kind)
     section.text(
-        f"{strange.mean():.1%} of the rows resemble what was shown in the other {_held(learned)} less than nearly all of "
-        "that resembles itself. A robot can ask for this before it acts: `Recall.familiarity`."
+        f"{strange.mean():.1%} of the rows resemble what was shown in the other {_held(learned)} less than nearly all "
+        "of that resembles itself. A robot can ask for this before it acts: `Recall.familiarity`."
     )
     if not strange.any() or strange.all():
         return
@@ -165,10 +167,10 @@ def _unfamiliar(section: Section, learned: Learned) -> None:
 def _contradictions(section: Section, learned: Learned) -> None:
     count, found = contradictions(learned)
     section.text(
-        f"{learned.report.contradicting:,} of {learned.report.samples:,} rows have exactly the condition of another row and "
-        f"another command. In a coarser view, of {REGIONS} regions per sensor, {count:.0%} of the rows have neighbours whose "
-        "commands differ by more than a quarter of the range: something that no sensor tells, such as what the robot is "
-        "about to do, decides there."
+        f"{learned.report.contradicting:,} of {learned.report.samples:,} rows have exactly the condition of another "
+        f"row and another command. In a coarser view, of {REGIONS} regions per sensor, the commands of {count:.0%} of "
+        "the rows differ from those of their neighbours by more than a quarter of the range: something that no sensor "
+        "tells, such as what the robot is about to do, decides there."
     )
     if found:
         columns = [Column("where"), Column("rows", format=","), Column("commands")]
@@ -176,7 +178,7 @@ def _contradictions(section: Section, learned: Learned) -> None:
 
 
 def _sizes(section: Section, learned: Learned) -> None:
-    names = [actuator.name for actuator in learned.schema.actuators]
+    ranges = {actuator.name: actuator.high - actuator.low for actuator in learned.schema.actuators}
     frame = pd.DataFrame(learned.by_size)
     section.text("More dimensions hold more; more bins tell closer readings apart, and need more rows.")
     columns = [Column("dim", "d", ","), Column("bins", "bins per sensor", ",")]
@@ -184,14 +186,14 @@ def _sizes(section: Section, learned: Learned) -> None:
     section.table(Table("Error by d and bins", columns, "In the first fold.").show(learned.by_size))
     section.figure(
         "sizes",
-        functools.partial(_draw_sizes, frame, names),
+        functools.partial(_draw_sizes, frame, ranges),
         "The error of each actuator by the number of dimensions, and by bins",
-        "Error by dimensions (with 256 bins) and by bins (with 4,000 dimensions), relative to the first of each.",
+        "Error as a share of the range, by dimensions (with 256 bins) and by bins (with 4,000 dimensions).",
         frame,
     )
 
 
-def _draw_sizes(frame: pd.DataFrame, names: list[str]) -> Figure:
+def _draw_sizes(frame: pd.DataFrame, ranges: dict[str, float]) -> Figure:
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 2.8), layout="constrained")
@@ -199,34 +201,30 @@ def _draw_sizes(frame: pd.DataFrame, names: list[str]) -> Figure:
     sides = ("dim", frame.loc[frame["bins"] == 256]), ("bins", frame.loc[frame["dim"] == 4000])
     for place, (x, part) in zip(axes, sides, strict=True):
         part = part.sort_values(x)
-        tall = part.melt([x], names, "actuator", "error")
-        first = part[names].iloc[0].clip(lower=1e-12)
-        tall["error"] /= tall["actuator"].map(first)
-        lines(place, tall, x, "error", "actuator", order=names)
-        place.set(xscale="log", xlabel={"dim": "dimensions", "bins": "bins per sensor"}[x], ylabel="relative error")
+        tall = part.melt([x], list(ranges), "actuator", "error")
+        tall["error"] /= tall["actuator"].map(ranges)
+        lines(place, tall, x, "error", "actuator", order=list(ranges))
+        place.set(xscale="log", xlabel={"dim": "dimensions", "bins": "bins per sensor"}[x], ylabel="error / range")
         place.set_xticks(part[x], [f"{value:,}" for value in part[x]], minor=False)
         place.minorticks_off()
-        place.set_ylim(bottom=0)
+    axes[0].set_ylim(bottom=0)
     legend_below(figure, axes[0])
-    axes[1].get_legend().remove() if axes[1].get_legend() else None
     return figure
 
 
 def _columns(section: Section, learned: Learned) -> None:
     parts = [*learned.schema.sensors, *learned.schema.actuators]
-    rows = [
-        {"name": part.name, "what": "sensor" if place < len(learned.schema.sensors) else "actuator", "is": described(part)}
-        for place, part in enumerate(parts)
-    ]
+    rows = [{"name": part.name, "what": type(part).__name__.lower(), "is": described(part)} for part in parts]
     columns = [Column("name"), Column("what"), Column("is", "range")]
     section.table(Table("Sensors and actuators", columns, words=True).show(rows))
     if learned.notes:
         section.code("\n".join(learned.notes), "How the columns of the log were understood.")
 
 
-def described(part: object) -> str:
+def described(part: Sensor | Actuator) -> str:
     """The range of a sensor or an actuator in words."""
+    if isinstance(part, Sensor) and part.values:
+        return ", ".join(map(str, part.values))
     unit = f" {part.unit}" if part.unit else ""
-    levels = f" in {part.levels} levels" if hasattr(part, "levels") else ""
-    values = getattr(part, "values", None)
-    return ", ".join(map(str, values)) if values else f"{part.low:g} to {part.high:g}{unit}{levels}"
+    levels = f" in {part.levels} levels" if isinstance(part, Actuator) else ""
+    return f"{part.low:g} to {part.high:g}{unit}{levels}"

@@ -1,4 +1,4 @@
-"""Where a learned behaviour errs, what contradicts, and what to demonstrate next: rows by the regions of their readings."""
+"""Where a learned behaviour errs, what contradicts, and what to demonstrate next, by regions of the readings."""
 
 from typing import Any
 
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from behaviours import Sensor
 from behaviours.commands.learn import Learned
-from behaviours.commands.validate import OURS, RIVALS
+from behaviours.commands.validate import RIVALS
 
 REGIONS = 8
 """The readings of a sensor are divided into at most so many regions."""
@@ -31,7 +31,7 @@ def regions(learned: Learned) -> pd.DataFrame:
         places, labels, middles = divided(sensor, column)
         for place in range(len(labels)):
             here = places == place
-            for model in (OURS, *RIVALS[:2]):
+            for model in (learned.kind, *RIVALS[:2]):
                 errors = learned.validation.errors(model)[here].mean(0) if here.any() else []
                 for actuator, error in zip(learned.schema.actuators, errors, strict=False):
                     name = labels[place] if sensor.kind in ("categorical", "binary") else ""
@@ -53,7 +53,7 @@ def runs(learned: Learned) -> Rows:
     for group in np.unique(groups):
         here = groups == group
         row: dict[str, Any] = {"run": str(group), "rows": int(here.sum())}
-        for model in (OURS, *RIVALS):
+        for model in (learned.kind, *RIVALS):
             errors = validation.errors(model)[here].mean(0).tolist()
             names = (f"{model} {actuator.name}" for actuator in learned.schema.actuators)
             row |= dict(zip(names, errors, strict=True))
@@ -65,7 +65,7 @@ def next_demonstrations(learned: Learned) -> Rows:
     """The regions with a large share of the error, or with unfamiliar readings, the most promising first."""
     validation = learned.validation
     ranges = np.array([actuator.high - actuator.low for actuator in learned.schema.actuators])
-    errors = (validation.errors(OURS) / ranges).mean(1)
+    errors = (validation.errors(learned.kind) / ranges).mean(1)
     strange, mean, found = validation.unfamiliar, errors.mean(), []
     for sensor, column in _columns(learned):
         places, labels, _ = divided(sensor, column)
@@ -138,7 +138,8 @@ def divided(sensor: Sensor, column: NDArray[np.float64]) -> tuple[NDArray[np.int
     places[seen] = place.ravel()
     ends = [readings.min(), *edges, readings.max()]
     unit = f" {sensor.unit}" if sensor.unit else ""
-    labels = [f"{ends[k]:.3g} to {ends[k + 1]:.3g}{unit}" for k in used]
+    pairs = ((f"{ends[k]:.3g}", f"{ends[k + 1]:.3g}") for k in used)
+    labels = [f"{low}{unit}" if low == high else f"{low} to {high}{unit}" for low, high in pairs]
     return places, labels, [float(np.median(readings[place.ravel() == k])) for k in range(len(used))]
 
 

@@ -41,6 +41,20 @@ def test_the_control_loop_keeps_its_rate(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_a_csv_log_becomes_a_behaviour(tmp_path: Path) -> None:
+    printed = output_of(tmp_path, "csv_log.py")
+    errors = re.findall(r"(\w+): mean error ([\d.]+); of the mean command ([\d.]+)", printed)
+    assert [name for name, *_ in errors] == ["left_motor", "right_motor"]
+    assert all(float(mine) < float(mean) / 3 for _, mine, mean in errors)
+    assert "distance: sensor, real; its range is" in printed
+    bank = BehaviourBank.load(tmp_path / "drive.safetensors")
+    assert bank["drive"].smooth
+    assert [sensor.unit for sensor in bank.space.schema.sensors] == ["m", "m", "m"]
+    # The same log, read again.
+    assert "drive.safetensors is written" in output_of(tmp_path, "csv_log.py", "corral.csv")
+
+
+@pytest.mark.slow
 def test_a_clone_of_five_episodes_balances_the_pole(tmp_path: Path) -> None:
     printed = output_of(tmp_path, "clone_cartpole.py")
     returns = [float(one) for one in re.findall(r"[\d.]+", printed.split("returns [")[1].split("]")[0])]

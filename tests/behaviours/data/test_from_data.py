@@ -160,7 +160,7 @@ def test_units_travel_and_are_compared(tmp_path: Path) -> None:
     assert loaded.where(loaded.commands[:, 0] > 0).units == shown.units
     assert Demonstrations.join([loaded, shown]).units == shown.units
     other = Schema([Sensor("front", 0, 4000, unit="mm")], schema.actuators)
-    with pytest.raises(ValueError, match="'front' is in m in the demonstrations, and in mm in the schema"):
+    with pytest.raises(ValueError, match="'front' is in m in these demonstrations, and in mm in the schema"):
         BehaviourBank(Space(other)).learn("drive", loaded)
     with pytest.raises(ValueError, match="units has 'rear'"):
         Demonstrations([[1.0]], [[1.0]], sensor_names=["front"], units={"rear": "m"})
