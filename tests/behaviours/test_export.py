@@ -197,7 +197,10 @@ def test_a_classifier_in_onnxruntime(tmp_path: Path) -> None:
     X[::11, 1] = np.nan
     y = np.array(["stop", "left", "right"])[(X[:, 0] > 0).astype(int) + (X[:, 2] > 0.5)]
     model = BehaviourClassifier(dim=500, bins=64, epochs=20, random_state=0).fit(X, y)
-    path = to_onnx(model.behaviour_, tmp_path / "classes.onnx")
+    path = to_onnx(model, tmp_path / "classes.onnx")
+    meta = onnxruntime.InferenceSession(path).get_modelmeta().custom_metadata_map
+    assert json.loads(meta["labels"]) == {json.loads(meta["actuators"])[0]: ["left", "right", "stop"]}
+    assert Schema.from_dict(json.loads(meta["schema"])) == model.behaviour_.space.schema
     commands = answers(path, X)[0][:, 0].numpy().astype(int)
     np.testing.assert_array_equal(model.classes_[commands], model.predict(X))
     # Beyond the training rows, and on an edge between two bins.
@@ -206,6 +209,35 @@ def test_a_classifier_in_onnxruntime(tmp_path: Path) -> None:
     edge = sensor.low + float(features.edges[0, 7]) * (sensor.high - sensor.low)
     odd = np.array([[99.0, -99, 0], [edge, 0, 0]])
     np.testing.assert_array_equal(answers(path, odd)[0].numpy(), model.behaviour_(odd).commands.numpy())
+
+
+@pytest.mark.slow
+def test_readings_and_commands_in_float32(tmp_path: Path) -> None:
+    schema, shown = corral()
+    behaviour = ErrorDriven().fit(Space(schema, encoder(torchvsa.architecture("MAP-C", 512, "int8"), bins=16)), shown)
+    labels = {"left_wheel": list(range(schema.actuators[0].levels))}
+    path = to_onnx(behaviour, tmp_path / "narrow.onnx", dtype=torch.float32, labels=labels)
+    session = onnxruntime.InferenceSession(path)
+    assert session.get_inputs()[0].type == session.get_outputs()[0].type == "tensor(float)"
+    readings = shown.sensors.to(torch.float32)
+    commands, similarity, *_ = session.run(None, {"readings": readings.numpy()})
+    expected = behaviour(readings.double())
+    assert torch.equal(torch.from_numpy(commands), expected.commands.float())
+    assert torch.equal(torch.from_numpy(similarity), expected.similarity)
+    assert json.loads(session.get_modelmeta().custom_metadata_map["labels"]) == labels
+
+
+def test_wrong_labels_and_types_are_refused_before_any_work(tmp_path: Path) -> None:
+    behaviour = OneShot().fit(space(64), random_pairs(3))
+    name, levels = behaviour.space.schema.actuators[0].name, behaviour.space.schema.actuators[0].levels
+    for options, why in (
+        ({"dtype": torch.float16}, "float64 or torch.float32"),
+        ({"labels": {"wheel?": [1]}}, "labels has 'wheel\\?'"),
+        ({"labels": {name: ["one"] * (levels + 1)}}, f"has {levels} levels"),
+    ):
+        with pytest.raises(ValueError, match=why):
+            to_onnx(behaviour, tmp_path / "x.onnx", **options)  # pyright: ignore[reportArgumentType]
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.slow
