@@ -24,6 +24,7 @@ class Log:
         sensors: The columns of readings, if the source knows them.
         actuators: The columns of commands, if the source knows them.
         left_out: What was not read, and why.
+        rate: The number of rows per second, if the source knows it.
     """
 
     values: Mapping[str, Column]
@@ -33,6 +34,7 @@ class Log:
     sensors: Sequence[str] | None = None
     actuators: Sequence[str] | None = None
     left_out: Mapping[str, str] = field(default_factory=dict)
+    rate: float | None = None
 
     @property
     def columns(self) -> list[str]:
