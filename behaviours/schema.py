@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from behaviours.env_spaces import propose_for
 from behaviours.kinds import canonical, to_unit_interval, valid_readings
 from behaviours.parts import Actuator, Sensor, most_parts
 from behaviours.proposal import propose
@@ -104,6 +105,37 @@ class Schema:
                 that are missing or constant, data without rows, and wrong corrections.
         """
         found = propose(data, sensors, actuators, by, changes)
+        if show is not None:
+            for line in found.lines():
+                show(line)
+        return cls(found.sensors, found.actuators)
+
+    @classmethod
+    def from_env(cls, env: Any, data: Any = None, *, show: Callable[[str], object] | None = None) -> "Schema":
+        """The schema of a Gymnasium environment: its observations are the sensors, its actions the actuators.
+
+            shown = behaviours.data.collect(env, expert, episodes=5)
+            schema = Schema.from_env(env, shown)
+
+        | an element of | as a sensor | as an actuator |
+        |---|---|---|
+        | `Box` | real, with its bounds, and clips | with its bounds; a level for each of up to 64 whole numbers |
+        | `Discrete`, `MultiDiscrete` | categorical; of 0 and 1, binary | a level for each value |
+        | `MultiBinary` | binary | two levels |
+
+        `Dict` and `Tuple` are flattened; names are those of `data`, or such as `observation[2]` and `action.arm`.
+        Images and text are left out.
+
+        Args:
+            env: The environment.
+            data: Recorded columns with these names, as of `collect`. Bounds that are infinite are learned from them, as
+                the ranges of `from_data`.
+            show: Called with a line of text for each element.
+
+        Raises:
+            ValueError: For infinite bounds without data, actions that are not numbers, and anything but an environment.
+        """
+        found = propose_for(env, data)
         if show is not None:
             for line in found.lines():
                 show(line)

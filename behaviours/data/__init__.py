@@ -4,10 +4,22 @@ Each reader imports its library when it is called; `pip install 'torchvsa[data]'
 """
 
 from behaviours.data.csv_file import read_csv
+from behaviours.data.gymnasium_env import action_of, collect, readings_of, schema_from_env
 from behaviours.data.lerobot_folder import read_lerobot
 from behaviours.data.log import Log
 from behaviours.data.parquet import read_parquet
 from behaviours.data.reading import read
 from behaviours.data.wall_following_set import load_wall_following
 
-__all__ = ["Log", "load_wall_following", "read", "read_csv", "read_lerobot", "read_parquet"]
+__all__ = [
+    "Log",
+    "action_of",
+    "collect",
+    "load_wall_following",
+    "read",
+    "read_csv",
+    "read_lerobot",
+    "read_parquet",
+    "readings_of",
+    "schema_from_env",
+]
