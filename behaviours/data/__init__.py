@@ -7,6 +7,7 @@ from behaviours.data.csv_file import read_csv
 from behaviours.data.gymnasium_env import action_of, collect, readings_of, schema_from_env
 from behaviours.data.lerobot_folder import read_lerobot
 from behaviours.data.log import Log
+from behaviours.data.mcap_file import read_mcap
 from behaviours.data.minari_set import read_minari, write_minari
 from behaviours.data.parquet import read_parquet
 from behaviours.data.reading import read
@@ -20,6 +21,7 @@ __all__ = [
     "read",
     "read_csv",
     "read_lerobot",
+    "read_mcap",
     "read_minari",
     "read_parquet",
     "readings_of",

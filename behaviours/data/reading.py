@@ -6,6 +6,7 @@ from pathlib import Path
 from behaviours.data.csv_file import read_csv
 from behaviours.data.lerobot_folder import is_lerobot, read_lerobot
 from behaviours.data.log import Log
+from behaviours.data.mcap_file import is_bag, read_mcap
 from behaviours.data.minari_set import is_minari, read_minari
 from behaviours.data.parquet import read_parquet
 
@@ -14,11 +15,13 @@ READERS: dict[str, Callable[[Path], Log]] = {
     ".tsv": read_csv,
     ".txt": read_csv,
     ".parquet": read_parquet,
+    ".mcap": read_mcap,
 }
 """The reader of each suffix."""
 FOLDERS: dict[str, tuple[Callable[[Path], bool], Callable[[Path], Log]]] = {
     "a LeRobotDataset (with meta/info.json)": (is_lerobot, read_lerobot),
     "a Minari data set (with data/metadata.json)": (is_minari, read_minari),
+    "a bag of ROS 2 (with files *.mcap)": (is_bag, read_mcap),
 }
 """What a folder may be: whether it is one, and its reader."""
 
