@@ -13,12 +13,13 @@ DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
 from docstrings import converted  # noqa: E402 (of the site)
 
-PAGES = ["start", "how", "own-robot", "architectures", "estimators", "smooth"]
+PAGES = ["start", "how", "own-robot", "formats", "architectures", "estimators", "smooth"]
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_the_code_of_a_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     blocks = re.findall(r"```python\n(.*?)```", (DOCS / f"{page}.md").read_text(), re.DOTALL)
     assert blocks
     printed = io.StringIO()
@@ -27,6 +28,10 @@ def test_the_code_of_a_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.
     if page == "start":
         assert "tensor([[1.]]" in printed.getvalue()
         assert (tmp_path / "bank.safetensors").exists()
+    if page == "formats":
+        # Each log that is read from a file has the rows that were written.
+        assert re.findall(r"Log\((\d+) rows", printed.getvalue()) == ["3", "4", "3", "500", "500"]
+        assert (tmp_path / "own/cart-v0/data/main_data.hdf5").exists()
     if page == "how":
         unrelated, same, member = (float(one) for one in re.findall(r"tensor\(([-\d.]+)\)", printed.getvalue()))
         assert abs(unrelated) < 0.08

@@ -63,6 +63,16 @@ def test_a_clone_of_five_episodes_balances_the_pole(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_what_a_lerobot_arm_showed_is_learned(tmp_path: Path) -> None:
+    printed = output_of(tmp_path, "lerobot.py")
+    assert "Log(2000 rows" in printed
+    assert "episode_index: left out, it names the episodes" in printed
+    errors = re.findall(r"action\.(\w+): mean error ([\d.]+); of the mean command ([\d.]+)", printed)
+    assert [joint for joint, _, _ in errors] == ["shoulder", "elbow"]
+    assert all(float(error) < 0.5 * float(mean) for _, error, mean in errors)
+
+
+@pytest.mark.slow
 def test_the_ros_node_publishes_what_the_behaviour_commands_and_stops_when_blind(tmp_path: Path) -> None:
     schema = Schema(
         [Sensor("near", 0, 1, "m", "clip"), Sensor("far", 0, 1, "m", "clip")],
