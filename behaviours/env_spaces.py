@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float64
 
+from behaviours.columns import require
 from behaviours.parts import Actuator, Sensor
 from behaviours.proposal import Proposal, propose
 from behaviours.tables import checked_names, columns_of
@@ -210,11 +211,12 @@ def _range(element: Element, columns: dict[str, np.ndarray[Any, Any]] | None) ->
     """The bounds of an element; those that it lacks are learned from the data."""
     low, high = element.low, element.high
     if not element.bounded:
-        if columns is None or element.name not in columns:
+        if columns is None:
             raise ValueError(
                 f"{element.name} has no finite bounds in the environment: give data to learn its range from, such as "
                 "behaviours.data.collect(env, controller, episodes=5)"
             )
+        require(element.name, list(columns))
         learned = _learned_range(element.name, columns[element.name])
         low, high = (low if np.isfinite(low) else learned[0]), (high if np.isfinite(high) else learned[1])
     return (low, high) if low < high else (low - 1, low + 1)

@@ -79,6 +79,8 @@ def read_mcap(path: str | Path, topics: Sequence[str] | None = None, commands: s
 
     Needs mcap and mcap-ros2-support. Raises `ValueError` in one line for topics that are not in the recording, if the
     topic of commands is not clear or never changes, and for a file that is damaged or not of ROS 2.
+
+    Source: the MCAP specification, https://mcap.dev/spec; units as in REP 103, infinite ranges as in REP 117.
     """
     path = Path(path)
     left_out: dict[str, str] = {}

@@ -153,6 +153,8 @@ def test_infinite_bounds_are_learned_or_refused() -> None:
     assert schema.actuators == (Actuator("push", 0, 1, levels=2),)
     with pytest.raises(ValueError, match=r"observation\[1\] has no finite bounds in the environment: give data"):
         Schema.from_env(env)
+    with pytest.raises(ValueError, match="there is no column 'observation"):
+        Schema.from_env(env, {"speed": [1.0]})
     env = Rig(done=spaces.Box(-math.inf, 3, (1,)))
     assert Schema.from_env(env, {"action": [-2.0, 5.0], "observation.count": [1.0, 1.0]}).actuators[0].low == -2
 
