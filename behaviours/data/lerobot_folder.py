@@ -155,7 +155,7 @@ def _read(path: Path, wanted: Mapping[str, list[str]]) -> dict[str, Column]:
             if missing:
                 raise ValueError(f"{path} has no column {missing[0]!r}, which meta/info.json names")
             table = file.read(["episode_index", *wanted])
-    except (pyarrow.ArrowInvalid, OSError) as error:
+    except (pyarrow.ArrowException, OSError, UnicodeDecodeError) as error:
         raise ValueError(f"{path} is no readable Parquet file: {' '.join(str(error).split())}") from None
     columns = {"episode_index": array_of(table["episode_index"])}
     if columns["episode_index"].dtype.kind not in "iu":

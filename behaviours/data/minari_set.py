@@ -41,9 +41,12 @@ def read_minari(dataset: Any) -> Log:
     minari: Any = needed("minari", "a Minari data set")
     try:
         opened = dataset if isinstance(dataset, minari.MinariDataset) else _opened(minari, dataset)
+        if opened.storage.FORMAT == "arrow":
+            _check_arrow(Path(opened.storage.data_path))
         metadata, found = opened.storage.metadata, list(opened.iterate_episodes())
-    except (ValueError, KeyError, TypeError, AssertionError, OSError) as error:
-        if isinstance(error, FileNotFoundError) and "there is no" in str(error):
+    # Damaged files, and environments that are not installed, raise anything: errors of h5py, pyarrow, Gymnasium, json.
+    except Exception as error:
+        if isinstance(error, ImportError) or (isinstance(error, FileNotFoundError) and "there is no" in str(error)):
             raise
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ValueError(f"{dataset} is no readable Minari data set: {reason:.200}") from None
@@ -159,6 +162,19 @@ def _opened(minari: Any, dataset: Any) -> Any:
     if not (root / str(dataset) / "data").is_dir():
         raise FileNotFoundError(f"there is no folder {dataset}, and no Minari data set with this id in {root}")
     return minari.load_dataset(str(dataset))
+
+
+def _check_arrow(folder: Path) -> None:
+    """Raise for damaged Arrow files, with which Minari's way of reading would end the process."""
+    pyarrow: Any = needed("pyarrow", "a Minari data set")
+    ipc: Any = needed("pyarrow.ipc", "a Minari data set", "pyarrow")
+    for path in folder.glob("*/*.arrow"):
+        with pyarrow.memory_map(str(path)) as source, ipc.open_file(source) as file:
+            for place in range(file.num_record_batches):
+                batch = file.get_batch(place)
+                if batch.num_rows < 0:
+                    raise ValueError(f"{path.parent.name}/{path.name} is damaged")
+                batch.validate(full=True)
 
 
 def _data_folder(folder: Path) -> Path:

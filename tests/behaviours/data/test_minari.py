@@ -202,3 +202,19 @@ def test_what_is_no_data_set_takes_one_line(root: Path) -> None:
     (folder / "data/main_data.hdf5").write_text("no HDF5")
     with pytest.raises(ValueError, match="is no readable Minari data set"):
         read(folder)
+
+
+def test_damaged_arrow_is_read_or_refused_and_never_ends_the_process(root: Path) -> None:
+    write_minari(demonstrations(), SCHEMA, "wall-v0", data_format="arrow")
+    path = root / "wall-v0/data/0/part-0.arrow"
+    content, refused = path.read_bytes(), []
+    for place in range(0, len(content), 9):
+        damaged = bytearray(content)
+        damaged[place] ^= 255
+        path.write_bytes(damaged)
+        try:
+            read(root / "wall-v0")
+        except ValueError as error:
+            refused.append(str(error))
+    assert len(refused) > 20
+    assert not any("\n" in reason for reason in refused)
