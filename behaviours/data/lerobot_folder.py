@@ -47,6 +47,8 @@ def read_lerobot(folder: str | Path) -> Log:
     parts = [_read(path, wanted) for path in _data_files(folder)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     episodes = columns.pop("episode_index").astype(np.int64)
+    if len(episodes) == 0:
+        raise ValueError(f"{folder} has no rows, only the columns {', '.join(columns)}")
     found = len(np.unique(episodes))
     if isinstance(total := info.get("total_episodes"), int) and found < total:
         left_out[f"{total - found} of {total} episodes"] = "their files are not in the folder"

@@ -209,6 +209,11 @@ def test_mistakes_take_one_line(changes: dict[str, Any], why: str, tmp_path: Pat
 
 def test_damaged_and_missing_files_are_named(tmp_path: Path) -> None:
     folder = dataset(tmp_path / "set", "v3.0")
+    empty = parquet.read_table(folder / "data/chunk-000/file-001.parquet").slice(0, 0)
+    for path in (folder / "data/chunk-000").iterdir():
+        parquet.write_table(empty, path)
+    with pytest.raises(ValueError, match="has no rows, only the columns observation"):
+        read(folder)
     (folder / "data/chunk-000/file-001.parquet").write_text("no Parquet")
     with pytest.raises(ValueError, match=r"file-001\.parquet is no readable Parquet file"):
         read(folder)
