@@ -32,8 +32,6 @@ _ROW_EPOCHS = 6_000_000
 """Rows times epochs: one thread trains about 40,000 a second, so that this takes minutes."""
 _SMOOTH_ROWS = 200_000
 """Smooth commands are learned from at most this many rows, evenly spread: one thread fits 2,000 a second."""
-_RIDGE = 0.1
-"""Of smooth commands: noisy demonstrations need more than exact ones."""
 
 Answer = Callable[[Float64[torch.Tensor, "B n"]], NDArray[np.float64]]
 
@@ -70,7 +68,7 @@ def default_rule(kind: str, rows: int) -> Rule:
     Levels get fewer epochs for very many rows, of which each epoch shows more.
     """
     if kind == SMOOTH:
-        return LeastSquares(smooth=True, ridge=_RIDGE)
+        return LeastSquares(smooth=True)
     return Gradient(sparse=True, epochs=min(Gradient.epochs, max(3, _ROW_EPOCHS // rows)))
 
 

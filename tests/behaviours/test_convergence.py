@@ -22,7 +22,7 @@ from behaviours import (
     OneShot,
 )
 from behaviours.learning import ConvergenceWarning, no_convergence_warnings
-from behaviours.learning.least_squares import solve
+from behaviours.learning.ridge import solve
 
 TRAINED = [ErrorDriven(epochs=20), Gradient(epochs=30, batch_size=16), LeastSquares()]
 trained = pytest.mark.parametrize("rule", TRAINED, ids=[rule.name for rule in TRAINED])

@@ -92,7 +92,7 @@ PARAMETERS = (
     + [(classifier, "patience", value) for value in NOT_WHOLE]
     + [(classifier, "learning_rate", value) for value in NOT_POSITIVE]
     + [(classifier, "validation_fraction", value) for value in (-0.1, 1, math.nan, "x", None)]
-    + [(regressor, "ridge", value) for value in NOT_POSITIVE]
+    + [(regressor, "ridge", value) for value in NOT_POSITIVE if value is not None]
     + [(model, "verbose", value) for model in MODELS for value in (-1, 0.5, "yes", None)]
     + [(model, "random_state", value) for model in MODELS for value in (-1, 2**32, "a", 1.5)]
 )

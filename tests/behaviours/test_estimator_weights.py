@@ -10,7 +10,7 @@ from sklearn.datasets import load_digits, load_iris
 from sklearn.utils.estimator_checks import check_param_validation
 
 from behaviours import BehaviourClassifier, BehaviourRegressor, Gradient, quantile_edges
-from behaviours.learning.least_squares import solve
+from behaviours.learning.ridge import solve
 from torchvsa import MAP
 
 RNG = np.random.default_rng(0)

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 import torch
-from robots import correct, random_pairs, space
+from robots import correct, random_pairs
+from robots import space as small
 
 import torchvsa
-from behaviours import Demonstrations, LeastSquares
-from behaviours.learning.least_squares import solve
+from behaviours import Actuator, Demonstrations, LeastSquares, Schema, Sensor, Space
+from behaviours.learning.conditions import LazyConditions
+from behaviours.learning.ridge import chosen_ridge, solve
 
 
 def plain(conditions: torch.Tensor, items: torch.Tensor, targets: torch.Tensor, ridge: float) -> np.ndarray:
@@ -43,14 +45,14 @@ def test_pairs_that_fit_are_answered_with_one_and_zero() -> None:
 def test_it_recalls_what_one_superposition_cannot() -> None:
     shown = random_pairs(400)
     assert (
-        correct(LeastSquares().fit(space(4000, protection={"name": "self_shift", "width": "sum"}), shown), shown).mean()
+        correct(LeastSquares().fit(small(4000, protection={"name": "self_shift", "width": "sum"}), shown), shown).mean()
         > 0.99
     )
 
 
 def test_contradictions_are_answered_by_their_shares() -> None:
     shown = Demonstrations([[1.0, 1, 1]] * 3, [[0.0, 1], [1, 1], [1, 1]])
-    behaviour = LeastSquares().fit(space(1000), shown)
+    behaviour = LeastSquares().fit(small(1000), shown)
     assert behaviour([[1.0, 1, 1]]).commands.tolist() == [[1, 1]]
     assert behaviour.report.contradicting == 1
 
@@ -58,4 +60,39 @@ def test_contradictions_are_answered_by_their_shares() -> None:
 def test_architectures_without_a_closed_form_are_refused() -> None:
     for name in ("HRR", "FHRR"):
         with pytest.raises(ValueError, match=f"element-wise binding of real numbers, which {name} lacks"):
-            LeastSquares().fit(space(64, name), random_pairs(3))
+            LeastSquares().fit(small(64, name), random_pairs(3))
+
+
+@pytest.mark.parametrize(("noise", "least", "most"), [(0.0, 1e-4, 1e-2), (3.0, 1e-1, 1.0)])
+def test_the_chosen_ridge_is_large_where_targets_are_noisy(noise: float, least: float, most: float) -> None:
+    generator = torch.Generator().manual_seed(0)
+    vsa = torchvsa.MAP(1000, dtype=torch.int8)
+    conditions, items, truth = (
+        vsa.random(600, generator=generator),
+        vsa.random(1, generator=generator),
+        torch.zeros(1000),
+    )
+    truth[:5] = 1.0
+    targets = (conditions.double() * items @ truth.double())[:, None]
+    targets += noise * torch.randn(600, 1, generator=generator, dtype=torch.float64)
+    chosen = [
+        chosen_ridge(vsa, conditions, items, targets, weights, torch.Generator().manual_seed(1))
+        for weights in (None, torch.ones(600, dtype=torch.float64))
+    ]
+    assert chosen[0] == chosen[1]
+    assert least <= chosen[0] <= most
+
+
+def test_conditions_that_are_encoded_on_access_give_the_same_program() -> None:
+    generator = torch.Generator().manual_seed(0)
+    space = Space(Schema([Sensor("x", 0, 1), Sensor("y", 0, 1)], [Actuator("u", -1, 1, levels=3)]))
+    cells = space.cells(torch.rand(5000, 2, generator=generator))
+    conditions, items = space.encode(cells), space.vsa.random(2, generator=generator)
+    targets = torch.randn(5000, 2, generator=generator, dtype=torch.float64)
+    weights = torch.randint(1, 4, (5000,), generator=generator).double()
+    for given in (None, weights):
+        held = solve(space.vsa, conditions, items, targets, 0.1, given)
+        assert torch.equal(held, solve(space.vsa, LazyConditions(space, cells), items, targets, 0.1, given))
+    twice = torch.arange(5000).repeat_interleave(weights.long())
+    again = solve(space.vsa, conditions[twice], items, targets[twice], 0.1)
+    torch.testing.assert_close(held, again, atol=1e-6, rtol=1e-4)

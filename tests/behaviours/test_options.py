@@ -22,7 +22,7 @@ REFUSED = [
     *[("gradient", "sparse", value) for value in ("no", 1, None)],
     *[("error_driven", "margin", value) for value in [*NO_NUMBERS, -0.1]],
     *[("error_driven", "average", value) for value in ("no", 1, None)],
-    *[("least_squares", "ridge", value) for value in [*NO_NUMBERS, 0, -1e-3]],
+    *[("least_squares", "ridge", value) for value in [*NO_NUMBERS, 0, -1e-3] if value is not None],
     *[("one_shot", "sigmas", value) for value in NO_NUMBERS],
     *[("one_shot", "threshold", value) for value in NO_NUMBERS if value is not None],
     *[("one_shot", "clip_each_step", value) for value in ("no", 1, None)],

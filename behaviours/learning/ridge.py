@@ -1,0 +1,166 @@
+"""Ridge regression of a program: the system that is solved, and the weight of the ridge."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import torch
+from jaxtyping import Float, Float64, Int64, Shaped
+from torch import Tensor
+
+from behaviours.learning.conditions import LazyConditions
+from behaviours.options import as_float
+from behaviours.progress import Progress, no_progress
+from torchvsa import VSA
+from torchvsa._numerics import as_bipolar, is_integer
+
+ROWS = 4096
+"""So many conditions are held as floats at once."""
+RIDGES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
+"""The weights that `chosen_ridge` compares."""
+_CHOSEN_FROM = 2500
+"""The weight is chosen with at most this many conditions: the best one hardly depends on their number."""
+
+
+@dataclass(frozen=True)
+class RidgeSystem:
+    """The equations of the program that comes nearest to the targets, see `solve`."""
+
+    vsa: VSA
+    matrix: Float64[Tensor, "n n"]
+    target: Float64[Tensor, "n"]
+    rows: Float[Tensor, "n d"] | None
+    """In the dual form, what the solution is multiplied with."""
+    scale: float
+    """The mean squared length of a pair, by which a ridge is multiplied."""
+
+    @classmethod
+    def of(
+        cls,
+        vsa: VSA,
+        conditions: Shaped[Tensor, "k d"] | LazyConditions,
+        items: Shaped[Tensor, "r d"],
+        targets: Float64[Tensor, "k r"],
+        weights: Float64[Tensor, "k"] | None = None,
+        progress: Progress = no_progress,
+    ) -> "RidgeSystem":
+        """The system of these pairs. Raises `ValueError` unless the architecture binds real numbers by elements."""
+        if not vsa.elementwise or vsa.dtype.is_complex:
+            raise ValueError(
+                f"least squares needs element-wise binding of real numbers, which {vsa.name} lacks; use ErrorDriven or "
+                "Gradient"
+            )
+        # Sums of fewer than 2^24 products of -1 and +1 are exact in float32, which is twice as fast.
+        kind = torch.float32 if is_integer(conditions[:1]) and is_integer(items) else torch.float64
+        r = as_bipolar(items).to(kind)
+        pairs = len(conditions) * len(r)
+        if weights is None:
+            weights = torch.ones(len(conditions), dtype=torch.float64, device=r.device)
+        if pairs <= vsa.dim:
+            rows = (as_bipolar(conditions[:]).to(kind)[:, None] * r).flatten(0, 1)
+            scale = float((rows.double() ** 2).sum()) / pairs
+            # A row of weight w is √w times as long.
+            roots = weights.sqrt().repeat_interleave(len(r))
+            matrix = (rows @ rows.T).double() * roots[:, None] * roots
+            progress(1.0)
+            return cls(vsa, matrix, roots * targets.reshape(-1), rows.double() * roots[:, None], scale)
+        # Element-wise binding makes the d × d matrix of all pairs a product of two small ones. It is a sum over the
+        # conditions, which need not be held at once.
+        matrix = torch.zeros(vsa.dim, vsa.dim, dtype=torch.float64, device=r.device)
+        target, squares = (torch.zeros(vsa.dim, dtype=torch.float64, device=r.device) for _ in range(2))
+        done = 0
+        for part in conditions.split(ROWS):
+            c, here = as_bipolar(part).to(kind), slice(done, done + len(part))
+            weighted = weights[here, None].to(kind) * c
+            matrix += (c.T @ weighted).double()
+            target += (weighted.double() * (targets[here] @ r.double())).sum(0)
+            squares += (c.double() ** 2).sum(0)
+            done += len(part)
+            progress(done / len(conditions))
+        return cls(
+            vsa, matrix.mul_((r.T @ r).double()), target, None, float(squares @ (r.double() ** 2).sum(0)) / pairs
+        )
+
+    def program(self, ridge: float) -> Float[Tensor, "d"]:
+        """The solution. Raises `ValueError` if there is none in floats with this ridge."""
+        matrix = self.matrix.clone()
+        matrix.diagonal().add_(ridge * self.scale)
+        factor, failed = torch.linalg.cholesky_ex(matrix)
+        if failed:
+            raise ValueError(f"ridge={ridge:g} is too small: the system cannot be solved in float64; take a larger one")
+        solution = torch.cholesky_solve(self.target[:, None], factor)[:, 0]
+        program = solution if self.rows is None else self.rows.T @ solution
+        program = program.to(torch.float64 if self.vsa.dtype == torch.float64 else torch.float32)
+        if not program.isfinite().all():
+            raise ValueError(f"ridge={ridge:g} leaves no finite solution; take one nearer to 1")
+        return program
+
+
+def solve(
+    vsa: VSA,
+    conditions: Shaped[Tensor, "k d"] | LazyConditions,
+    items: Shaped[Tensor, "r d"],
+    targets: Float64[Tensor, "k r"],
+    ridge: float,
+    weights: Float64[Tensor, "k"] | None = None,
+    progress: Progress = no_progress,
+) -> Float[Tensor, "d"]:
+    """The program p that minimises the sum over k and r of w_k (<c_k ⊗ r_r, p> - target)² plus `ridge` times s·|p|².
+
+    `s` is the mean squared length of a pair c ⊗ r, and w_k the weight of a condition, by default 1. With k·r pairs the
+    system has k·r unknowns in the dual and d in the primal form; the smaller one is solved, in float64.
+
+    Args:
+        vsa: The architecture of the hypervectors.
+        conditions: The conditions c; those that are encoded on access are not held at once in the primal form.
+        items: The hypervectors r that they are bound with.
+        targets: The target score of each pair.
+        ridge: The weight of the squared length of p, above 0.
+        weights: The weight of each condition, above 0.
+        progress: Called with the completed fraction of the work.
+
+    Raises:
+        ValueError: If the architecture has no element-wise binding of real numbers, if `ridge` is not above 0, and if
+            the system has no solution in floats with it.
+    """
+    ridge = check_ridge(ridge)
+    system = RidgeSystem.of(vsa, conditions, items, targets, weights, lambda done: progress(0.4 * done))
+    program = system.program(ridge)
+    progress(1.0)
+    return program
+
+
+def chosen_ridge(
+    vsa: VSA,
+    conditions: Shaped[Tensor, "k d"] | LazyConditions,
+    items: Shaped[Tensor, "r d"],
+    targets: Float64[Tensor, "k r"],
+    weights: Float64[Tensor, "k"] | None,
+    generator: torch.Generator,
+) -> float:
+    """The one of `RIDGES` with the smallest error on a fifth of the conditions, which the program was not fitted to.
+
+    Noisy demonstrations need a large weight, exact ones a small one. At most 2,500 conditions, drawn at random, take
+    part. Arguments as those of `solve`.
+    """
+    count = min(len(conditions), _CHOSEN_FROM)
+    if count < 5:
+        return RIDGES[1]
+    order = torch.randperm(len(conditions), generator=generator)[:count].to(targets.device)
+    held, rest = order[: count // 5], order[count // 5 :]
+
+    def of(index: Int64[Tensor, "i"]) -> tuple[Any, ...]:
+        return conditions[index], targets[index], None if weights is None else weights[index]
+
+    (fitted, wanted, weighted), (asked, known, counted) = of(rest), of(held)
+    system = RidgeSystem.of(vsa, fitted, items, wanted, weighted)
+    errors = []
+    for ridge in RIDGES:
+        readout = vsa.readout(system.program(ridge), items)
+        squares = ((readout(asked) * readout.lengths - known) ** 2).sum(1)
+        errors.append(float((squares if counted is None else squares * counted).sum()))
+    return RIDGES[errors.index(min(errors))]
+
+
+def check_ridge(ridge: Any) -> float:
+    """The weight of the squared length of the program as a float. Raises `ValueError` unless it is above 0."""
+    return as_float("ridge", ridge, 0, above=True)
