@@ -20,6 +20,9 @@ RIDGES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
 _CHOSEN_FROM = 2500
 """The weight is chosen with at most this many conditions: the best one hardly depends on their number."""
 
+_FEW, _OF_FEW = 100, 1e-3
+"""Fewer conditions do not tell noise from what was meant, so that all of them are to be recalled."""
+
 
 @dataclass(frozen=True)
 class RidgeSystem:
@@ -140,11 +143,11 @@ def chosen_ridge(
     """The one of `RIDGES` with the smallest error on a fifth of the conditions, which the program was not fitted to.
 
     Noisy demonstrations need a large weight, exact ones a small one. At most 2,500 conditions, drawn at random, take
-    part. Arguments as those of `solve`.
+    part; fewer than 100 get 1e-3. Arguments as those of `solve`.
     """
     count = min(len(conditions), _CHOSEN_FROM)
-    if count < 5:
-        return RIDGES[1]
+    if count < _FEW:
+        return _OF_FEW
     order = torch.randperm(len(conditions), generator=generator)[:count].to(targets.device)
     held, rest = order[: count // 5], order[count // 5 :]
 
