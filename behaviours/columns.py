@@ -66,10 +66,15 @@ def as_indices(column: Column, sensor: Sensor) -> Float64[np.ndarray, "N"]:
     unknown = [text for text in texts.tolist() if text not in labels]
     if unknown:
         row = int(np.flatnonzero(~missing)[present == unknown[0]][0])
-        raise ValueError(f"sensor {sensor.name!r} reads the text {unknown[0]!r:.80} in row {row}; {sensor.describe()}")
+        raise ValueError(unknown_text(sensor, unknown[0], row))
     places = np.full(len(column), np.nan)
     places[~missing] = np.array([labels[text] for text in texts.tolist()], dtype=np.float64)[inverse.ravel()]
     return places
+
+
+def unknown_text(sensor: Sensor, text: str, row: int) -> str:
+    """What an error says about a text that is none of the values of a sensor."""
+    return f"sensor {sensor.name!r} reads the text {str(text)!r:.80} in row {row}; {sensor.describe()}"
 
 
 def as_episodes(column: Column, name: str) -> Int64[np.ndarray, "N"]:

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from behaviours.columns import require
-from behaviours.parts import Actuator, Sensor
+from behaviours.parts import Actuator, Sensor, span
 from behaviours.proposal import Proposal, propose
 from behaviours.tables import checked_names, columns_of
 
@@ -140,7 +140,7 @@ def propose_for(env: Any, data: Any = None) -> Proposal:
     for element in commanded:
         actuator = _actuator(element, columns)
         found.actuators.append(actuator)
-        found.notes[element.name] = f"actuator; {actuator.low:g} to {actuator.high:g} in {actuator.levels} levels"
+        found.notes[element.name] = f"actuator; {span(actuator)} in {actuator.levels} levels"
     return found
 
 

@@ -200,3 +200,8 @@ class Actuator:
                 f"actuator {self.name!r}: {levels} levels of the range [{self.low}, {self.high}] cannot be told apart "
                 "in float64; take fewer levels, or a wider range, or one nearer to 0"
             )
+
+
+def span(part: Sensor | Actuator) -> str:
+    """The range of a sensor or an actuator in words, such as `0 to 4 m`."""
+    return f"{part.low:g} to {part.high:g}" + (f" {part.unit}" if part.unit else "")

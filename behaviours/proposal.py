@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float64
 
 from behaviours.columns import Column, as_episodes, as_numbers, has_text, is_missing, require
-from behaviours.parts import Actuator, Sensor
+from behaviours.parts import Actuator, Sensor, span
 from behaviours.tables import columns_of
 
 _MOST_VALUES = 32
@@ -87,8 +87,7 @@ def propose(
         options = _actuator(name, columns[name], units.get(name, ""))
         actuator = _changed(Actuator, name, options, change, columns[name])
         found.actuators.append(actuator)
-        unit = f" {actuator.unit}" if actuator.unit else ""
-        found.notes[name] = f"actuator; {actuator.low:g} to {actuator.high:g}{unit} in {actuator.levels} levels"
+        found.notes[name] = f"actuator; {span(actuator)} in {actuator.levels} levels"
     if not found.sensors:
         raise ValueError(f"no column is left as a sensor: {'; '.join(found.lines()) or 'there are none'}")
     return found

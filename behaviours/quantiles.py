@@ -21,7 +21,7 @@ from torch import Tensor
 
 from behaviours.edges import quantile_edges
 from behaviours.options import as_int
-from behaviours.progress import Progress, no_progress
+from behaviours.progress import Progress, in_steps, no_progress
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Space
 from torchvsa import MAP
@@ -101,16 +101,7 @@ class QuantileEncoding(BaseEstimator):
         """A callback that prints each completed tenth of the work if `verbose` is set."""
         if not self._whole("verbose", 0):
             return no_progress
-        printed = -1
-
-        def show(share: float) -> None:
-            nonlocal printed
-            tenth = int(10 * share)
-            if tenth > printed:
-                printed = tenth
-                print(f"[{type(self).__name__}] {share:.0%} done", flush=True)
-
-        return show
+        return in_steps(lambda share: print(f"[{type(self).__name__}] {share:.0%} done", flush=True), 10)
 
     def _rows(self, readings: Float64[np.ndarray, "N n"], targets: np.ndarray, sample_weight: Any) -> Rows:
         """The distinct rows of readings and targets `[N]` or `[N, m]`; their weights are added up.

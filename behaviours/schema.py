@@ -9,6 +9,7 @@ import torch
 from jaxtyping import Float64, Int64
 from torch import Tensor
 
+from behaviours.columns import unknown_text
 from behaviours.env_spaces import propose_for
 from behaviours.kinds import canonical, to_unit_interval, valid_readings
 from behaviours.parts import Actuator, Sensor, most_parts
@@ -221,7 +222,7 @@ class Schema:
                     continue
                 if value not in labels:
                     raise ValueError(
-                        f"sensor {sensor.name!r} reads the text {str(value)!r:.80} in row {row}; {sensor.describe()}"
+                        unknown_text(sensor, value, row)
                         + ("" if labels else " (rows of numbers and text are lists, arrays of objects or data frames)")
                     )
                 column[row] = labels[value]

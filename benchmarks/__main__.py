@@ -10,8 +10,9 @@ import torch
 
 from behaviours.storage import write_atomically
 from benchmarks.isolated import isolated
-from benchmarks.report import draw, fill, print_rows, wide_console
+from benchmarks.report import WIDTH, draw, fill, print_rows
 from benchmarks.works import FIT_TIMES, GROWTH, KEPT, ON_THE_CPU, WORKS, measure
+from experiments.kit.console import wide_console
 
 FOLDER = Path(__file__).parent
 
@@ -45,7 +46,7 @@ def main() -> None:
     for name, memory in runs:
         measured = isolated(measure, name, options, memory=memory)
         rows += [{**row, "machine": machine, "memory": memory} for row in measured]
-    console = wide_console()
+    console = wide_console(WIDTH)
     print_rows(rows, console)
     if out:
         write_atomically(out, (json.dumps(rows, indent=1) + "\n").encode())

@@ -12,15 +12,9 @@ from rich.table import Table
 
 from behaviours.storage import write_atomically
 
+WIDTH = 160
+"""Of the tables in a file."""
 Row = dict[str, Any]
-
-
-def wide_console() -> Console:
-    """The terminal, or a file as wide as the tables: it has no width of its own."""
-    console = Console()
-    if not console.is_terminal:
-        console.width = 160
-    return console
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,8 @@ from benchmarks import (
     sparse,
 )
 from benchmarks.harness import time_case
-from benchmarks.report import wide_console
+from benchmarks.report import WIDTH
+from experiments.kit.console import wide_console
 
 WORKS = {
     "encoding": encoding,
@@ -47,7 +48,7 @@ def measure(name: str, options: argparse.Namespace) -> list[dict[str, Any]]:
         return list(growth.rows(options.device, max(options.threads), min(options.repeats, 3), options.small))
     if name == FIT_TIMES:
         return list(fit_times.rows(max(options.threads), small=options.small))
-    rows, console = [], wide_console()
+    rows, console = [], wide_console(WIDTH)
     for case in WORKS[name].cases(options.device, options.small):
         for threads in options.threads:
             console.print(f"{case.work}, {case.shape}, {threads} threads", style="dim")

@@ -159,7 +159,7 @@ def learn(options: Options, progress: Callable[[str], Progress] = lambda what: n
     kinds = _kinds(options.commands, schema, shown)
     held = f"hold out {'runs' if by else 'stretches of time'}, {len(np.unique(folds))} times"
     validation = cross_validate(space, some, folds, kinds, progress(held))
-    kind = min(kinds, key=lambda kind: validation.relative(kind, schema))
+    kind = min(kinds, key=lambda kind: validation.relative(kind, schema).mean())
     given = taught(kind, shown)
     bank = BehaviourBank(space)
     report = bank.learn(options.name, given, default_rule(kind, len(shown)), progress(f"learn {len(given):,} rows"))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from behaviours.bank import BehaviourBank
 from behaviours.demonstrations import Demonstrations
+from behaviours.parts import span
 
 
 def show(path: str | Path) -> str:
@@ -23,11 +24,11 @@ def _bank(bank: BehaviourBank) -> Iterator[str]:
     yield f"bank of {len(bank)} behaviours over {parts.vsa}"
     yield f"encoder     {parts.encoder.config()['name']}, protection {parts.protect.config()['name']}"
     for sensor in schema.sensors:
-        what = f"one of {', '.join(map(str, sensor.values))}" if sensor.values else f"{sensor.low:g} to {sensor.high:g}"
-        yield f"sensor      {sensor.name}: {what}{f' {sensor.unit}' if sensor.unit else ''}, {sensor.kind}"
+        unit = f" {sensor.unit}" if sensor.unit else ""
+        what = f"one of {', '.join(map(str, sensor.values))}{unit}" if sensor.values else span(sensor)
+        yield f"sensor      {sensor.name}: {what}, {sensor.kind}"
     for actuator in schema.actuators:
-        unit = f" {actuator.unit}" if actuator.unit else ""
-        yield f"actuator    {actuator.name}: {actuator.low:g} to {actuator.high:g}{unit}, {actuator.levels} levels"
+        yield f"actuator    {actuator.name}: {span(actuator)}, {actuator.levels} levels"
     for name in bank:
         behaviour, report = bank[name], bank[name].report
         used = (

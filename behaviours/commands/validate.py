@@ -50,10 +50,10 @@ class Validation:
         """The absolute error of each command, in its unit."""
         return np.abs(self.predicted[model] - self.shown.commands.numpy())
 
-    def relative(self, model: str, schema: Schema) -> float:
-        """The mean absolute error relative to the range of each actuator."""
+    def relative(self, model: str, schema: Schema) -> Float64[np.ndarray, "N"]:
+        """The absolute error of each row, relative to the range of each actuator; the mean over them."""
         ranges = np.array([actuator.high - actuator.low for actuator in schema.actuators])
-        return float((self.errors(model) / ranges).mean())
+        return (self.errors(model) / ranges).mean(1)
 
     def agreement(self, model: str, schema: Schema) -> Bool[np.ndarray, "N m"]:
         """Whether each command has the level of the demonstrated one."""

@@ -88,7 +88,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         self.verbose = verbose
 
     @no_convergence_warnings()
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:  # noqa: N803 (scikit-learn's own name)
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
         """Train the program on rows `X` `[N, n]` and labels `y` `[N]`, which count as `sample_weight` `[N]` says.
 
         Raises `ValueError` for fewer than two classes, infinite values, rows of NaN only, features whose range is no
@@ -113,7 +113,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         return self
 
     @no_convergence_warnings()
-    def partial_fit(self, X: Any, y: Any, classes: Any = None, sample_weight: Any = None) -> Self:  # noqa: N803
+    def partial_fit(self, X: Any, y: Any, classes: Any = None, sample_weight: Any = None) -> Self:
         """Continue training with rows `X` `[N, n]` and labels `y` `[N]`; the first call needs all `classes`.
 
         The bin edges come from the first call, whose readings should span those of later calls, since values outside
@@ -168,7 +168,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         levels = torch.arange(len(self.classes_))[:, None]
         return Behaviour(space, zeros, known, levels, LearningReport(Gradient.name, samples=0, new=0, epochs=0))
 
-    def _scores(self, X: Any) -> Float64[np.ndarray, "N K"]:  # noqa: N803
+    def _scores(self, X: Any) -> Float64[np.ndarray, "N K"]:
         check_is_fitted(self)
         readings = self._checked(X, reset=False)
         behaviour = self.behaviour_
@@ -179,16 +179,16 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         columns: Int64[Tensor, "K"] = behaviour.results[:, 0].argsort()
         return torch.cat(rows)[:, columns].numpy()
 
-    def decision_function(self, X: Any) -> Float64[np.ndarray, "N ..."]:  # noqa: N803
+    def decision_function(self, X: Any) -> Float64[np.ndarray, "N ..."]:
         """The score of each class, `[N, K]`; for two classes, the score of the second less that of the first, `[N]`."""
         scores = self._scores(X)
         return scores[:, 1] - scores[:, 0] if len(self.classes_) == 2 else scores
 
-    def predict_proba(self, X: Any) -> Float64[np.ndarray, "N K"]:  # noqa: N803
+    def predict_proba(self, X: Any) -> Float64[np.ndarray, "N K"]:
         """The softmax of the scores, `[N, K]`, which the loss of the training uses."""
         return torch.softmax(torch.from_numpy(self._scores(X)), 1).numpy()
 
-    def predict(self, X: Any) -> Shaped[np.ndarray, "N"]:  # noqa: N803
+    def predict(self, X: Any) -> Shaped[np.ndarray, "N"]:
         """The class with the highest score, `[N]`."""
         best = self._scores(X).argmax(1)
         return self.classes_[best]

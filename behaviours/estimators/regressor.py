@@ -65,7 +65,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
         tags.target_tags.multi_output = True
         return tags
 
-    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:  # noqa: N803
+    def fit(self, X: Any, y: Any, sample_weight: Any = None) -> Self:
         """Train the program on rows `X` `[N, n]` and values `y` `[N]` or `[N, m]`, which count as `sample_weight` says.
 
         Raises `ValueError` for infinite values, rows of NaN only, features whose range is no finite float, weights
@@ -98,7 +98,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
         if self.ridge is not None:
             check_ridge(self.ridge)
 
-    def predict(self, X: Any) -> Float64[np.ndarray, "N ..."]:  # noqa: N803
+    def predict(self, X: Any) -> Float64[np.ndarray, "N ..."]:
         """The predicted values, `[N]` or `[N, m]` as in `fit`."""
         check_is_fitted(self)
         readings = self._checked(X, reset=False)

@@ -10,16 +10,13 @@ from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.base import Rule
 from behaviours.learning.convergence import FEW, warn_if_wrong
-from behaviours.learning.ridge import ROWS, check_ridge, chosen_ridge, solve
+from behaviours.learning.ridge import EXACT, ROWS, check_ridge, chosen_ridge, has_ridge, solve
 from behaviours.learning.samples import Contradictions, Samples, check_contradictions
 from behaviours.options import as_bool, as_float, set_fields
 from behaviours.progress import Progress, no_progress, subrange
 from behaviours.space import Space
 from torchvsa import VSA
 from torchvsa._numerics import norms
-
-_RIDGE = 1e-3
-"""For levels, which need no more than the right order."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ class LeastSquares(Rule):
     @classmethod
     def supports(cls, vsa: VSA) -> bool:
         """Whether the architecture binds real numbers element by element; see `Rule.supports`."""
-        return vsa.elementwise and not vsa.dtype.is_complex
+        return has_ridge(vsa)
 
     def fit(self, space: Space, demonstrations: Demonstrations, progress: Progress = no_progress) -> Behaviour:
         """Learn a behaviour, see `Rule.fit`.
@@ -79,23 +76,21 @@ class LeastSquares(Rule):
         Raises `ValueError` for an architecture that is not supported, and for a `ridge` with which the system has no
         solution in floats.
         """
-        shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2))
-        return (
-            self._learn_smooth(space, shown, demonstrations, progress)
-            if self.smooth
-            else self._learn(space, shown, progress)
-        )
+        return self._fit(space, demonstrations, None, progress)
 
     def fit_beside(
         self, space: Space, demonstrations: Demonstrations, silent: Demonstrations, progress: Progress = no_progress
     ) -> Behaviour:
         """Learn a behaviour that is silent where others have an opinion, see `Rule.fit_beside`."""
+        return self._fit(space, demonstrations, silent, progress)
+
+    def _fit(
+        self, space: Space, demonstrations: Demonstrations, silent: Demonstrations | None, progress: Progress
+    ) -> Behaviour:
         shown = Samples.of(space, demonstrations, subrange(progress, 0, 0.2), silent)
-        return (
-            self._learn_smooth(space, shown, demonstrations, progress)
-            if self.smooth
-            else self._learn(space, shown, progress)
-        )
+        if self.smooth:
+            return self._learn_smooth(space, shown, demonstrations, progress)
+        return self._learn(space, shown, progress)
 
     def _learn_smooth(
         self, space: Space, samples: Samples, demonstrations: Demonstrations, progress: Progress
@@ -147,7 +142,7 @@ class LeastSquares(Rule):
             targets = functional.pad(targets, (0, 0, 0, len(samples.silent)))
         every = samples.items(space)
         targets = functional.pad(targets, (0, len(every) - len(items)))
-        ridge = _RIDGE if self.ridge is None else self.ridge
+        ridge = EXACT if self.ridge is None else self.ridge
         program = solve(space.vsa, fitted, every, targets, ridge, progress=subrange(progress, 0.2, 0.9))
         readout = space.vsa.readout(program, items)
         predicted = torch.cat([readout(rows).argmax(1) for rows in conditions.split(ROWS)])

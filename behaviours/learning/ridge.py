@@ -20,8 +20,15 @@ RIDGES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
 _CHOSEN_FROM = 2500
 """The weight is chosen with at most this many conditions: the best one hardly depends on their number."""
 
-_FEW, _OF_FEW = 100, 1e-3
-"""Fewer conditions do not tell noise from what was meant, so that all of them are to be recalled."""
+EXACT = 1e-3
+"""A weight that is small enough to recall what was shown."""
+_FEW = 100
+"""Fewer conditions do not tell noise from what was meant."""
+
+
+def has_ridge(vsa: VSA) -> bool:
+    """Whether the architecture binds real numbers element by element, which the closed form needs."""
+    return vsa.elementwise and not vsa.dtype.is_complex
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class RidgeSystem:
         progress: Progress = no_progress,
     ) -> "RidgeSystem":
         """The system of these pairs. Raises `ValueError` unless the architecture binds real numbers by elements."""
-        if not vsa.elementwise or vsa.dtype.is_complex:
+        if not has_ridge(vsa):
             raise ValueError(
                 f"least squares needs element-wise binding of real numbers, which {vsa.name} lacks; use ErrorDriven or "
                 "Gradient"
@@ -147,7 +154,7 @@ def chosen_ridge(
     """
     count = min(len(conditions), _CHOSEN_FROM)
     if count < _FEW:
-        return _OF_FEW
+        return EXACT
     order = torch.randperm(len(conditions), generator=generator)[:count].to(targets.device)
     held, rest = order[: count // 5], order[count // 5 :]
 

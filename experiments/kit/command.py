@@ -24,6 +24,7 @@ from omegaconf.errors import OmegaConfBaseException
 from rich.console import Console
 
 from experiments.kit import run as runs
+from experiments.kit.console import wide_console
 from experiments.kit.messages import in_words
 from experiments.kit.options import register_groups
 from experiments.kit.safety import refuse_code
@@ -64,9 +65,7 @@ class _Job:
 
     def __call__(self, cfg: DictConfig) -> float | None:
         study = self.study
-        console = Console()
-        if not console.is_terminal:
-            console.width = 150  # a file has no width of its own; the tables need this much
+        console = wide_console()
         # A sweep goes on after a job that failed, and Hydra then says which one it was.
         alone = HydraConfig.get().mode == RunMode.RUN
         with errors_in_one_line(study.name) if alone else nullcontext():

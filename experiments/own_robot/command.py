@@ -6,10 +6,9 @@ import sys
 import time
 from collections.abc import Sequence
 
-from rich.console import Console
-
 from behaviours.commands.learn import learn, options_of, proposed
-from behaviours.progress import Progress
+from behaviours.progress import Progress, in_steps
+from experiments.kit.console import wide_console
 from experiments.own_robot.tables import score_table
 
 
@@ -20,10 +19,7 @@ def learn_log(arguments: Sequence[str]) -> int:
         print(f"{proposed(options)} says what each column is; correct it, and learn with --schema {options.propose}")
         return 0
     learned = learn(options, shown_progress)
-    console = Console()
-    if not console.is_terminal:
-        console.width = 150
-    console.print(score_table(learned).terminal())
+    wide_console().print(score_table(learned).terminal())
     written = str(options.output)
     if options.page is not None:
         from experiments.own_robot.page import write_page  # which imports what draws
@@ -35,18 +31,13 @@ def learn_log(arguments: Sequence[str]) -> int:
 
 def shown_progress(what: str) -> Progress:
     """Progress of a part of the work on stderr: one line on a terminal, otherwise a line for each tenth."""
-    began, told = time.monotonic(), -1
-    terminal = sys.stderr.isatty()
+    began, terminal = time.monotonic(), sys.stderr.isatty()
 
-    def show(fraction: float) -> None:
-        nonlocal told
-        step = int((100 if terminal else 10) * fraction + 1e-9)
-        if step == told:
-            return
-        told = step
+    def tell(fraction: float) -> None:
         line = f"{what}: {fraction:4.0%}, {time.monotonic() - began:.0f} s"
         print(f"\r{line}" if terminal else line, end="\n" if not terminal or fraction >= 1 else "", file=sys.stderr)
         sys.stderr.flush()
 
+    show = in_steps(tell, 100 if terminal else 10)
     show(0.0)
     return show

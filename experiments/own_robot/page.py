@@ -11,6 +11,7 @@ import pandas as pd
 from behaviours import Actuator, Sensor
 from behaviours.commands.learn import Learned, score_rows
 from behaviours.commands.validate import RIVALS, SMOOTH
+from behaviours.parts import span
 from experiments.kit.columns import Column, Table
 from experiments.kit.figures import legend_below, lines
 from experiments.kit.page import Page, Section
@@ -225,6 +226,4 @@ def described(part: Sensor | Actuator) -> str:
     """The range of a sensor or an actuator in words."""
     if isinstance(part, Sensor) and part.values:
         return ", ".join(map(str, part.values))
-    unit = f" {part.unit}" if part.unit else ""
-    levels = f" in {part.levels} levels" if isinstance(part, Actuator) else ""
-    return f"{part.low:g} to {part.high:g}{unit}{levels}"
+    return f"{span(part)} in {part.levels} levels" if isinstance(part, Actuator) else span(part)

@@ -27,13 +27,14 @@ def regions(learned: Learned) -> pd.DataFrame:
     `share` is the largest difference between the errors of a sensor's regions, relative to the range of the actuator.
     """
     rows: Rows = []
+    errors = {model: learned.validation.errors(model) for model in (learned.kind, *RIVALS[:2])}
     for sensor, column in _columns(learned):
         places, labels, middles = divided(sensor, column)
         for place in range(len(labels)):
             here = places == place
-            for model in (learned.kind, *RIVALS[:2]):
-                errors = learned.validation.errors(model)[here].mean(0) if here.any() else []
-                for actuator, error in zip(learned.schema.actuators, errors, strict=False):
+            for model, off in errors.items():
+                means = off[here].mean(0) if here.any() else []
+                for actuator, error in zip(learned.schema.actuators, means, strict=False):
                     name = labels[place] if sensor.kind in ("categorical", "binary") else ""
                     rows.append(
                         {"sensor": sensor.name, "actuator": actuator.name, "model": model, "reading": middles[place],
@@ -49,14 +50,14 @@ def runs(learned: Learned) -> Rows:
     """The error of each model and actuator by run, or by stretch of time."""
     validation = learned.validation
     groups = learned.validation.shown.episodes.numpy() if learned.by else validation.folds
+    errors = {model: validation.errors(model) for model in (learned.kind, *RIVALS)}
     rows = []
     for group in np.unique(groups):
         here = groups == group
         row: dict[str, Any] = {"run": str(group), "rows": int(here.sum())}
-        for model in (learned.kind, *RIVALS):
-            errors = validation.errors(model)[here].mean(0).tolist()
+        for model, off in errors.items():
             names = (f"{model} {actuator.name}" for actuator in learned.schema.actuators)
-            row |= dict(zip(names, errors, strict=True))
+            row |= dict(zip(names, off[here].mean(0).tolist(), strict=True))
         rows.append(row)
     return rows
 
@@ -64,8 +65,7 @@ def runs(learned: Learned) -> Rows:
 def next_demonstrations(learned: Learned) -> Rows:
     """The regions with a large share of the error, or with unfamiliar readings, the most promising first."""
     validation = learned.validation
-    ranges = np.array([actuator.high - actuator.low for actuator in learned.schema.actuators])
-    errors = (validation.errors(learned.kind) / ranges).mean(1)
+    errors = validation.relative(learned.kind, learned.schema)
     strange, mean, found = validation.unfamiliar, errors.mean(), []
     for sensor, column in _columns(learned):
         places, labels, _ = divided(sensor, column)

@@ -230,13 +230,14 @@ def test_readings_and_commands_in_float32(tmp_path: Path) -> None:
 def test_wrong_labels_and_types_are_refused_before_any_work(tmp_path: Path) -> None:
     behaviour = OneShot().fit(space(64), random_pairs(3))
     name, levels = behaviour.space.schema.actuators[0].name, behaviour.space.schema.actuators[0].levels
-    for options, why in (
+    wrong: list[tuple[dict[str, Any], str]] = [
         ({"dtype": torch.float16}, "float64 or torch.float32"),
         ({"labels": {"wheel?": [1]}}, "labels has 'wheel\\?'"),
         ({"labels": {name: ["one"] * (levels + 1)}}, f"has {levels} levels"),
-    ):
+    ]
+    for options, why in wrong:
         with pytest.raises(ValueError, match=why):
-            to_onnx(behaviour, tmp_path / "x.onnx", **options)  # pyright: ignore[reportArgumentType]
+            to_onnx(behaviour, tmp_path / "x.onnx", **options)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -196,14 +196,14 @@ BY = ("--actuators", "v,omega", "--by", "run")
     ],
 )
 def test_mistakes_take_one_line_and_nothing_is_written(
-    log: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, change: object,
-    arguments: tuple[str, ...], why: str,
+    log: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    change: str | tuple[str, str] | None, arguments: tuple[str, ...], why: str,
 ) -> None:  # fmt: skip
     monkeypatch.chdir(log.parent)
     if isinstance(change, str):
         log.write_text(change)
     elif change is not None:
-        old, new = change  # type: ignore[misc]
+        old, new = change
         frame = driven().astype(str)
         frame = frame.replace(r"r\d", "r0", regex=True) if old == "r1" else frame
         if old != "r1":
