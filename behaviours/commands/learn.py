@@ -62,6 +62,7 @@ class Learned:
     options: Options
     schema: Schema
     by: str | None
+    """What names the run of each row; None if stretches of time are held out."""
     notes: list[str]
     """What each column was taken for."""
     shown: Demonstrations
@@ -154,7 +155,9 @@ def learn(options: Options, progress: Callable[[str], Progress] = lambda what: n
     if blind:
         notes.append(f"{blind} rows without any reading: left out")
     some = thinned(shown, VALIDATED)
-    folds = folds_of(some, by or ("episode" if len(shown.episodes.unique()) > 1 else None))
+    if by is None and len(shown.episodes.unique()) > 1:
+        by = "episode"  # the format itself tells runs apart
+    folds = folds_of(some, by)
     space = space_of(schema, options.dim, options.seed)
     kinds = _kinds(options.commands, schema, shown)
     held = f"hold out {'runs' if by else 'stretches of time'}, {len(np.unique(folds))} times"

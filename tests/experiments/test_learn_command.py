@@ -1,6 +1,7 @@
 """`torchvsa learn` turns a log into a bank and a page, and compares models by run."""
 
 import io
+import json
 import re
 import sys
 from dataclasses import replace
@@ -8,7 +9,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
+from pyarrow import parquet
 
 from behaviours import BehaviourBank
 from behaviours.commands.learn import Learned, learn, options_of
@@ -151,6 +154,24 @@ def test_without_runs_stretches_of_time_are_held_out(log: Path) -> None:
     found = learned(log, "--sensors", "near", "--actuators", "omega", "--no-page")
     assert found.by is None
     assert found.validation.folds.tolist() == [row * 5 // (RUNS * ROWS) for row in range(RUNS * ROWS)]
+
+
+def test_the_runs_that_a_format_knows_are_held_out(tmp_path: Path) -> None:
+    frame = driven()
+    numbers = frame["run"].str.removeprefix("r").astype(int).tolist()
+    columns = {"observation.near": frame["near [m]"], "action": frame["omega [rad/s]"]}
+    feature = {"dtype": "float64", "shape": [1], "names": None}
+    info = {"codebase_version": "v3.0", "fps": 20, "features": dict.fromkeys(columns, feature)}
+    folder = tmp_path / "arm"
+    for part in ("meta", "data/chunk-000"):
+        (folder / part).mkdir(parents=True)
+    (folder / "meta/info.json").write_text(json.dumps(info))
+    table = pa.table(columns | {"episode_index": numbers})
+    parquet.write_table(table, folder / "data/chunk-000/file-000.parquet")
+    found = learned(folder, "--no-page")
+    assert found.validation.folds.tolist() == numbers
+    assert "runs that it was not shown" in score_table(found).caption
+    assert [row["run"] for row in runs(found)] == ["0", "1", "2", "3"]
 
 
 def test_the_same_seed_learns_the_same_bits(log: Path) -> None:
