@@ -28,6 +28,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if name in ("ask", "show"):
         with errors_in_one_line(f"torchvsa {name}"):
             sys.exit(asked(rest) if name == "ask" else shown(rest))
+    if name == "rrd":
+        with errors_in_one_line("torchvsa rrd"):
+            write_rrd(rest)
+        return
     if name == "settings":
         print(studies.settings_page(), end="")
         return
@@ -70,6 +74,16 @@ def draw_again(arguments: Sequence[str]) -> None:
             print(outcome.folder / "report.html")
 
 
+def write_rrd(arguments: Sequence[str]) -> None:
+    """Write the kept starts of a finished run of the corral as files for Rerun, and print their paths."""
+    if not arguments:
+        raise ValueError("which folder? give one of a finished run of torchvsa corral")
+    from experiments.corral.rrd import write_starts
+
+    for path in write_starts(Path(arguments[0]), arguments[1:]):
+        print(path)
+
+
 def print_commands(console: Console) -> None:
     """What can be run."""
     studies.import_all()
@@ -81,5 +95,6 @@ def print_commands(console: Console) -> None:
     table.add_row("ask BANK [NAME]", "Answer rows of readings: CSV from a pipe, CSV with commands out.")
     table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
+    table.add_row("rrd FOLDER [START ...]", "Write drives of a finished run of corral for the Rerun viewer.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)
