@@ -7,9 +7,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+import torchvsa
 from behaviours.commands.ask import ask
 from behaviours.commands.show import show
 from experiments import studies
+from experiments.installation import shared_names
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.run import draw, load
@@ -22,6 +24,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print_commands(Console())
         return
     name, rest = given[0], given[1:]
+    if name == "--version":
+        print("\n".join([f"torchvsa {torchvsa.__version__}", *shared_names()]))
+        return
     if name == "draw":
         draw_again(rest)
         return
@@ -96,5 +101,6 @@ def print_commands(console: Console) -> None:
     table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
     table.add_row("rrd FOLDER [START ...]", "Write drives of a finished run of corral for the Rerun viewer.")
+    table.add_row("--version", "Print the version, and installed packages that take names of this one.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)
