@@ -1,13 +1,15 @@
 # `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs;
 # `make docs` builds the site in docs/_build/html;
 # `make bench` measures speed compared with peers; `make fuzz` loads 200,000 damaged files; `make combinations` drives
-# every rule x architecture x protection x record.
+# every rule x architecture x protection x record; `make release-check` builds wheel and source distribution, and
+# installs and uses them with every extra and with other Pythons, in about 15 minutes. After a change of constraints.txt,
+# `make hashes` writes requirements-hashed.txt, and `make licences` docs/licences.md.
 PYTHON ?= python3.11
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/.installed
 
-.PHONY: run test lint docs bench combinations fuzz
+.PHONY: run test lint docs bench combinations fuzz release-check hashes licences
 
 run: $(INSTALLED)
 	$(BIN)/python -m experiments corral
@@ -27,6 +29,15 @@ combinations: $(INSTALLED)
 
 fuzz: $(INSTALLED)
 	$(BIN)/python tests/helpers/mutants.py --count 200000
+
+release-check: $(INSTALLED)
+	PYTHONPATH=tests/helpers $(BIN)/python tests/packaging/release_check.py
+
+hashes: $(INSTALLED)
+	PYTHONPATH=tests/helpers $(BIN)/python tests/packaging/hashes.py
+
+licences: $(INSTALLED)
+	PYTHONPATH=tests/helpers $(BIN)/python tests/packaging/licences.py
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .

@@ -1,23 +1,11 @@
 """Reproducible studies, one file per question. The only place where robot and algebra meet."""
 
-from importlib.util import find_spec
+import sys
+from pathlib import Path
 
-_NEEDED = (
-    "hydra",
-    "hydra_plugins",
-    "joblib",
-    "cloudpickle",
-    "pandas",
-    "pyarrow",
-    "seaborn",
-    "matplotlib",
-    "jinja2",
-    "rich",
-    "sklearn",
-    "scipy",
-    "gymnasium",
-    "py_trees",
-)
+from experiments.installation import problem
 
-if _missing := next((name for name in _NEEDED if find_spec(name) is None), None):
-    raise ImportError(f"{_missing} is missing; the experiments need: pip install 'torchvsa[corral]'", name=_missing)
+if (_found := problem()) is not None:
+    if Path(sys.argv[0]).name in ("torchvsa", "torchvsa-corral"):  # commands say it in one line
+        sys.exit(f"torchvsa: {_found}")
+    raise _found

@@ -7,9 +7,11 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+import torchvsa
 from behaviours.commands.ask import ask
 from behaviours.commands.show import show
 from experiments import studies
+from experiments.installation import shared_names
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.run import draw, load
@@ -23,6 +25,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print_commands(Console())
         return
     name, rest = given[0], given[1:]
+    if name == "--version":
+        print("\n".join([f"torchvsa {torchvsa.__version__}", *shared_names()]))
+        return
     if name == "draw":
         draw_again(rest)
         return
@@ -54,7 +59,18 @@ def shown(arguments: Sequence[str]) -> bool:
     return False
 
 
-COMMANDS = {"learn": learn_log, "ask": asked, "show": shown}
+def rrd_written(arguments: Sequence[str]) -> bool:
+    """Write the kept starts of a finished run of the corral as files for Rerun, and print their paths."""
+    if not arguments:
+        raise ValueError("which folder? give one of a finished run of torchvsa corral")
+    from experiments.corral.rrd import write_starts
+
+    for path in write_starts(Path(arguments[0]), arguments[1:]):
+        print(path)
+    return False
+
+
+COMMANDS = {"learn": learn_log, "ask": asked, "show": shown, "rrd": rrd_written}
 """What works with files; each returns the exit status."""
 
 
@@ -87,5 +103,7 @@ def print_commands(console: Console) -> None:
     table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
     table.add_row("learn LOG", "Learn a behaviour from a log, compare it by run, and write a bank and a page.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
+    table.add_row("rrd FOLDER [START ...]", "Write drives of a finished run of corral for the Rerun viewer.")
+    table.add_row("--version", "Print the version, and installed packages that take names of this one.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)

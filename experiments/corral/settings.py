@@ -5,7 +5,7 @@ from importlib.util import find_spec
 
 import sim
 from behaviours import BehaviourBank, Demonstrations, OneShot
-from experiments.corral.controllers import CONTROLLERS, DEFAULT_ROWS, original, printed_space
+from experiments.corral.controllers import CONTROLLERS, DEFAULT_ROWS, driving, original, printed_space
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.models import hand_written
 from experiments.tasks import corral
@@ -52,6 +52,12 @@ def check(settings: Corral) -> None:
         parts.refuse_unsupported(parts.rule(settings.paper.rule), printed_space(settings))
     if "hand_written" in settings.controllers:
         hand_written.behaviour(space.vsa, settings.seed)
+    bullet = [name for name in settings.controllers if driving(settings, name).engine == "bullet"]
+    if bullet and find_spec("pybullet") is None:
+        raise ValueError(
+            f"controllers: {', '.join(bullet)} drive in pybullet, which is there for Python 3.11 only: pip install "
+            "'torchvsa[sim]', or leave them out"
+        )
     if "ppo" in settings.controllers and find_spec("stable_baselines3") is None:
         raise ValueError("controllers: ppo needs stable-baselines3: pip install 'torchvsa[rl]'")
     if settings.demonstrations_file is not None:

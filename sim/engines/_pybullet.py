@@ -12,7 +12,8 @@ if "pybullet" not in sys.modules:
         os.dup2(_devnull, 2)
         import pybullet
     except ImportError as error:
-        raise ImportError("the simulator needs pybullet: pip install 'torchvsa[sim]'", name="pybullet") from error
+        hint = "the engine bullet needs pybullet, which is there for Python 3.11 only: pip install 'torchvsa[sim]'"
+        raise ImportError(hint, name="pybullet") from error
     finally:
         os.dup2(_stderr, 2)
         os.close(_devnull)
