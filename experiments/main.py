@@ -28,6 +28,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if name in ("ask", "show"):
         with errors_in_one_line(f"torchvsa {name}"):
             sys.exit(asked(rest) if name == "ask" else shown(rest))
+    if name == "collect":
+        from experiments.collecting.command import collect
+
+        console = Console()
+        if not console.is_terminal:
+            console.width = 150
+        with errors_in_one_line("torchvsa collect"):
+            collect(rest, studies.find, console)
+        return
     if name == "settings":
         print(studies.settings_page(), end="")
         return
@@ -81,5 +90,6 @@ def print_commands(console: Console) -> None:
     table.add_row("ask BANK [NAME]", "Answer rows of readings: CSV from a pipe, CSV with commands out.")
     table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
+    table.add_row("collect FOLDER", "Gather the runs of a sweep, say what is missing, and compare two of them.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)
