@@ -14,6 +14,7 @@ from experiments import studies
 from experiments.installation import shared_names
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
+from experiments.kit.console import wide_console
 from experiments.kit.run import draw, load
 from experiments.own_robot.command import learn_log
 
@@ -33,7 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     if name in COMMANDS:
         with errors_in_one_line(f"torchvsa {name}", "stopped"):
-            sys.exit(COMMANDS[name](rest))
+            if COMMANDS[name](rest):
+                sys.exit(1)
+        return
     if name == "settings":
         print(studies.settings_page(), end="")
         return
@@ -70,8 +73,16 @@ def rrd_written(arguments: Sequence[str]) -> bool:
     return False
 
 
-COMMANDS = {"learn": learn_log, "ask": asked, "show": shown, "rrd": rrd_written}
-"""What works with files; each returns the exit status."""
+def collected(arguments: Sequence[str]) -> bool:
+    """Gather the runs below a folder, and compare two of them."""
+    from experiments.collecting.command import collect
+
+    collect(arguments, studies.find, wide_console())
+    return False
+
+
+COMMANDS = {"learn": learn_log, "ask": asked, "show": shown, "collect": collected, "rrd": rrd_written}
+"""What works with files; each returns whether something was wrong with what it was given."""
 
 
 def corral() -> None:
@@ -104,6 +115,7 @@ def print_commands(console: Console) -> None:
     table.add_row("learn LOG", "Learn a behaviour from a log, compare it by run, and write a bank and a page.")
     table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
     table.add_row("rrd FOLDER [START ...]", "Write drives of a finished run of corral for the Rerun viewer.")
+    table.add_row("collect FOLDER", "Gather the runs of a sweep, say what is missing, and compare two of them.")
     table.add_row("--version", "Print the version, and installed packages that take names of this one.")
     table.add_row("settings", "Print the settings of all studies as Markdown.")
     console.print(table)

@@ -16,7 +16,7 @@ What every study can be told: `torchvsa STUDY setting=value`. `torchvsa STUDY --
 of several options: `group=option` chooses one, `group.setting=value` changes it.
 """
 
-_SHARED = ("__main__", "main", "installation", "studies", "kit", "models", "tasks")
+_SHARED = ("__main__", "main", "installation", "studies", "kit", "collecting", "models", "tasks")
 
 
 def _modules() -> Iterator[str]:

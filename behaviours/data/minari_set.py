@@ -113,6 +113,7 @@ def write_minari(
         raise ValueError(f"data_format is 'hdf5' or 'arrow'; got {data_format!r}")
     shown.check(schema)
     target = needed("minari.storage.datasets_root_dir", "a Minari data set", "minari").get_dataset_path(dataset_id)
+    target = target.absolute()  # Minari joins a relative folder to itself
     if target.exists():
         raise ValueError(f"there is a data set {dataset_id} already, in {target}; take another name or version")
     longest = int(shown.episodes.unique(return_counts=True)[1].max())

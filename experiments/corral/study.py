@@ -94,6 +94,7 @@ study = Study(
     measure=measure,
     summarise=summarise,
     keys=("controller",),
+    units=("kind", "episode"),
     metrics=metrics,
     table=tables.MAIN,
     headline=headline,

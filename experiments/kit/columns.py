@@ -17,6 +17,7 @@ from typing import Any, Literal
 
 import pandas as pd
 import rich.table
+from rich.markup import escape
 
 NONE = "-"
 """How a value that does not exist is shown."""
@@ -125,9 +126,12 @@ class Table:
         """The table for rich's console."""
         table = rich.table.Table(title=self.title)
         for place, column in enumerate(self.columns):
-            table.add_column(column.title, justify="left" if place == 0 or self.words else "right", no_wrap=True)
+            table.add_column(
+                escape(column.title), justify="left" if place == 0 or self.words else "right", no_wrap=True
+            )
         for row in self.cells:
-            table.add_row(*(f"[bold green]{cell.text}" if cell.mark == "best" else cell.text for cell in row))
+            texts = [(escape(cell.text), cell.mark) for cell in row]  # a list such as [a,b] is no markup
+            table.add_row(*(f"[bold green]{text}" if mark == "best" else text for text, mark in texts))
         return table
 
     def markdown(self) -> str:

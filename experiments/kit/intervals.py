@@ -45,3 +45,28 @@ def bootstrap(
     found = np.array([statistic(row) for row in sample[places]])
     low, high = np.quantile(found, [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
     return float(low), float(high)
+
+
+def bootstrap_nested(
+    samples: Sequence[Sequence[float]], drawn: bool = True, seed: int = 0, draws: int = 2000
+) -> tuple[float, float]:
+    """The percentile interval (low, high) of the mean over samples, e.g. the starts of each of several runs.
+
+    Each draw takes as many samples as there are, with replacement, and of each of them as many values as it has; where
+    the samples are not `drawn`, but all that are asked about, each of them once. The statistic is the mean of the
+    samples' means. One value gives (NaN, NaN). Source: Davison and Hinkley 1997, sections 3.2 and 3.8.
+    """
+    known = [np.asarray(sample, dtype=np.float64) for sample in samples]
+    if not known or not all(map(len, known)):
+        raise ValueError("an interval needs at least one value in each sample")
+    if len(known) == 1 or all(len(sample) == 1 for sample in known):
+        return bootstrap(np.concatenate(known).tolist(), seed=seed, draws=draws)
+    generator = np.random.default_rng(seed)
+    places = np.arange(len(known))
+    chosen = generator.integers(0, len(known), (draws, len(known))) if drawn else np.tile(places, (draws, 1))
+    means = np.empty(chosen.shape)
+    for place, sample in enumerate(known):
+        at = np.nonzero(chosen == place)
+        means[at] = [sample[generator.integers(0, len(sample), len(sample))].mean() for _ in at[0]]
+    low, high = np.quantile(means.mean(axis=1), [(1 - LEVEL) / 2, (1 + LEVEL) / 2])
+    return float(low), float(high)

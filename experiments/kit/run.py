@@ -19,7 +19,7 @@ from experiments.kit import store
 from experiments.kit.page import Page
 from experiments.kit.pool import measured
 from experiments.kit.settings import check
-from experiments.kit.study import STUDIES, Outcome, Row, Study
+from experiments.kit.study import STUDIES, Cell, Outcome, Row, Study
 
 
 def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
@@ -34,19 +34,18 @@ def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
         console.print(f"{folder} holds the results of these settings; fresh=true begins anew", soft_wrap=True)
         return load(folder, study)[1]
     folder.mkdir(parents=True, exist_ok=True)
+    begun = store.Begun(folder, study.name, config, cells)
     if len(missing) < len(cells):
         done = f"{len(cells) - len(missing)} of {len(cells)} cells"
         console.print(f"{folder} holds {done} of these settings; fresh=true begins anew", soft_wrap=True)
-    if missing:
-        with progress_bars(console) as progress:
-            material = study.prepare(settings, folder, progress)
-            task = progress.add_task("measure", total=len(missing))
-            for place, found in measured(study.measure, material, missing, settings.workers):
-                kept.add(missing[place], store.plain_rows(found))
-                progress.advance(task)
-    records = pd.DataFrame([cell | row for cell in cells for row in kept.find(cell) or []])
-    table = [store.plain(row) for row in study.summarise(settings, records)]
-    metrics = store.plain({**_metrics(study, table), **study.metrics(settings, records, table)})
+    try:
+        _measure(study, settings, folder, missing, kept, console)
+        records = pd.DataFrame([cell | row for cell in cells for row in kept.find(cell) or []])
+        table = [store.plain(row) for row in study.summarise(settings, records)]
+        metrics = store.plain({**_metrics(study, table), **study.metrics(settings, records, table)})
+    except Exception as error:
+        begun.failed(error)
+        raise
     outcome = Outcome(folder, settings, config, records, table, metrics, store.provenance(study.name))
     store.write_frame(folder / "records.parquet", records)
     store.write_results(
@@ -64,6 +63,20 @@ def run(study: Study, settings: Any, folder: Path, console: Console) -> Outcome:
     )
     draw(study, outcome, console)
     return outcome
+
+
+def _measure(
+    study: Study, settings: Any, folder: Path, missing: Sequence[Cell], kept: store.Cells, console: Console
+) -> None:
+    """Measure the missing cells, and keep each as soon as it is done."""
+    if not missing:
+        return
+    with progress_bars(console) as progress:
+        material = study.prepare(settings, folder, progress)
+        task = progress.add_task("measure", total=len(missing))
+        for place, found in measured(study.measure, material, missing, settings.workers):
+            kept.add(missing[place], store.plain_rows(found))
+            progress.advance(task)
 
 
 def check_all(study: Study, settings: Any) -> None:
@@ -96,14 +109,14 @@ def finished(folder: Path, study: Study, config: dict[str, Any]) -> bool:
     """Whether a folder holds the results of a study, in this version and with these settings."""
     if not (folder / "results.json").is_file():
         return False
-    found = _results(folder)
+    found = read_results(folder)
     made = (found["study"], found["version"], store.relevant(found["config"]))
     return made == (study.name, torchvsa.__version__, store.plain(store.relevant(config)))
 
 
 def load(folder: Path, study: Study | None = None) -> tuple[Study, Outcome]:
     """A study, by default the registered one, and what it found, from the folder of a finished run."""
-    content = _results(folder)
+    content = read_results(folder)
     study = study or STUDIES.find(content["study"])
     settings = settings_of(study, content["config"])
     records = pd.read_parquet(folder / "records.parquet")
@@ -111,15 +124,15 @@ def load(folder: Path, study: Study | None = None) -> tuple[Study, Outcome]:
     return study, Outcome(folder, settings, config, records, table, metrics, provenance)
 
 
-def _results(folder: Path) -> dict[str, Any]:
+def read_results(folder: Path) -> dict[str, Any]:
     """The content of `results.json`. Raises `ValueError`, naming the file, unless a run wrote it."""
     path = folder / "results.json"
     try:
         content = json.loads(path.read_text())
-    except json.JSONDecodeError as error:
+    except (ValueError, RecursionError) as error:
         raise ValueError(f"{path} is not JSON: {error}") from error
-    needed = {"study", "version", "config", "table", "metrics", "provenance"}
-    if not isinstance(content, dict) or not needed <= set(content):
+    needed = {"study": str, "version": str, "config": dict, "table": list, "metrics": dict, "provenance": dict}
+    if not isinstance(content, dict) or not all(isinstance(content.get(key), kind) for key, kind in needed.items()):
         raise ValueError(f"{path} does not hold the results of a study")
     return content
 

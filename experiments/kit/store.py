@@ -10,7 +10,8 @@ import platform
 import socket
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -34,9 +35,16 @@ class Cells:
     which no result depends may differ.
     """
 
-    def __init__(self, folder: Path, study: str, config: Mapping[str, Any], fresh: bool) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        study: str,
+        config: Mapping[str, Any],
+        fresh: bool = False,
+        version: str = torchvsa.__version__,
+    ) -> None:
         self.path = folder / "cells.jsonl"
-        self._run = [study, torchvsa.__version__, relevant(config)]
+        self._run = [study, version, relevant(config)]
         self._known: dict[str, list[Row]] = {}
         self._torn = ""
         if fresh:
@@ -67,6 +75,24 @@ class Cells:
             file.flush()
             os.fsync(file.fileno())
         self._known[key], self._torn = records, ""
+
+
+class Begun:
+    """What a run is about to measure: `run.json`, written first, so that what is missing can be told later.
+
+    It holds the study, the version, the settings and the cells; and, once the run failed, the error in one line.
+    """
+
+    def __init__(self, folder: Path, study: str, config: Mapping[str, Any], cells: Sequence[Row]) -> None:
+        self._path = folder / "run.json"
+        self._content = {"study": study, "version": torchvsa.__version__, "config": config, "cells": list(cells)}
+        write_results(self._path, self._content)
+
+    def failed(self, error: Exception) -> None:
+        """Add why the run ended."""
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        with suppress(OSError):  # the disk may be what failed
+            write_results(self._path, {**self._content, "error": text})
 
 
 def relevant(config: Mapping[str, Any]) -> Row:

@@ -95,6 +95,8 @@ class Study:
             depends on nothing but its arguments.
         summarise: `summarise(settings, records)` returns the rows of the table.
         keys: the columns of the table that name a row; all its other numbers become metrics `{key}.{key}.{column}`.
+        units: the columns of the records that, with the cell's factors and `keys`, say what a row was measured on (a
+            start, a fold), so that rows of two runs can be compared in pairs.
         prepare: `prepare(settings, folder, progress)` returns what all cells share, by default the settings. It runs
             once, if any cell is missing; files that it writes to the folder can be used by the page.
         check: raises `ValueError` for settings that cannot work, before anything is prepared.
@@ -116,6 +118,7 @@ class Study:
     measure: Callable[[Any, Cell], Row | list[Row]]
     summarise: Callable[[Any, pd.DataFrame], list[Row]]
     keys: Sequence[str]
+    units: Sequence[str] = ()
     prepare: Callable[[Any, Path, Any], Any] = lambda settings, folder, progress: settings
     check: Callable[[Any], None] = lambda settings: None
     metrics: Callable[[Any, pd.DataFrame, list[Row]], Mapping[str, float | None]] = lambda *given: {}

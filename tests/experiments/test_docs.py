@@ -13,6 +13,7 @@ from packages import ROOT, install, python
 from experiments import studies
 from experiments.kit.run import config_of
 from experiments.kit.store import write_results
+from experiments.main import COMMANDS
 
 README = (ROOT / "README.md").read_text()
 COLLECT = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[-1]
@@ -38,7 +39,7 @@ def test_the_settings_of_its_commands_are_settings() -> None:
     assert len(commands) > 2
     for name, overrides in commands:
         words = [word for word in overrides.split() if "=" in word and not word.startswith("hydra")]
-        if name != "draw" and "--config-dir" not in overrides:
+        if name not in {"draw", *COMMANDS} and "--config-dir" not in overrides:
             composed(studies.find(name), *(word.split(",")[0] for word in words))
 
 

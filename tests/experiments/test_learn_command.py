@@ -56,11 +56,13 @@ def log(tmp_path: Path) -> Path:
 
 def typed(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
     """The exit status of `torchvsa learn`, what it prints, and what it says on the side."""
-    with pytest.raises(SystemExit) as ended:
+    status = 0
+    try:
         main(["learn", *map(str, arguments)])
+    except SystemExit as ended:
+        status = ended.code if isinstance(ended.code, int) else 0
     printed = capsys.readouterr()
-    code = ended.value.code
-    return (code if isinstance(code, int) else 0), printed.out, printed.err
+    return status, printed.out, printed.err
 
 
 def learned(path: Path, *arguments: str) -> Learned:

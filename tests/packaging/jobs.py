@@ -3,6 +3,7 @@
 `python -P jobs.py NAME`; the names are those of the extras, and `library` for what comes without any.
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -136,6 +137,30 @@ def rerun() -> None:
     assert "/familiarity/default" in {chunk.entity_path for chunk in chunks}
 
 
+def data() -> None:
+    """A table, an environment of Gymnasium's, a data set of Minari's and a recording of ROS 2."""
+    import gymnasium
+    from mcap_ros2.writer import Writer
+    from pyarrow import parquet, table
+
+    import behaviours as bh
+    from behaviours.data import collect, read, write_minari
+
+    parquet.write_table(table({"front": [0.1, 0.9], "v": [0, 1]}), "log.parquet")
+    assert bh.Schema.from_data(read("log.parquet"), ["v"]).actuators[0].levels == 2
+    env = gymnasium.make("CartPole-v1")
+    log = collect(env, lambda seen: int(seen[2] > 0), episodes=2)
+    schema = bh.Schema.from_env(env, log)
+    os.environ["MINARI_DATASETS_PATH"] = "sets"
+    write_minari(bh.Demonstrations.from_data(log, schema), schema, "own/cart-v0")
+    assert len(read("sets/own/cart-v0")) == len(log)
+    with open("run.mcap", "wb") as file, Writer(file) as writer:
+        kind = writer.register_msgdef("std_msgs/msg/Float64", "float64 data")
+        for topic, value in (("/front", 1.0), ("/speed", 2.0), ("/speed", 3.0)):
+            writer.write_message(topic, kind, {"data": value}, log_time=len(topic) + int(value))
+    assert len(bh.data.read_mcap("run.mcap", commands="/speed")) == 2
+
+
 def onnx() -> None:
     """A behaviour as an ONNX file, which the runtime answers from."""
     import numpy as np
@@ -166,7 +191,7 @@ def docs() -> None:
 JOBS: dict[str, Callable[[], None]] = {
     job.__name__: job
     for job in (
-        library, without_studies, sklearn, vector, sim, studies, corral, rl, control, cluster, rerun, onnx, docs
+        library, without_studies, sklearn, vector, sim, studies, corral, rl, control, cluster, data, rerun, onnx, docs
     )
 }  # fmt: skip
 

@@ -140,6 +140,14 @@ def test_what_is_written_is_read_again_and_by_minari(data_format: str) -> None:
     assert again.units == log.units
 
 
+def test_a_folder_of_data_sets_may_be_relative(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "here")
+    write_minari(demonstrations(), SCHEMA, "own/wall-v0")
+    assert len(read_minari("own/wall-v0")) == len(demonstrations())
+    assert [path.name for path in (tmp_path / "here" / "own").glob("*v0")] == ["wall-v0"]
+
+
 def test_jax_is_not_needed() -> None:
     write_minari(demonstrations(), SCHEMA, "wall-v0")
     assert len(read_minari("wall-v0")) == 12
