@@ -1,6 +1,8 @@
 """The site: its code runs, its links lead somewhere, and docstrings become what Sphinx reads."""
 
 import contextlib
+import doctest
+import importlib
 import io
 import re
 import sys
@@ -37,6 +39,21 @@ def test_the_code_of_a_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.
         assert abs(unrelated) < 0.08
         assert same == 1
         assert 0.4 < member < 0.6
+
+
+MODULES = [
+    ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__")
+    for package in ("torchvsa", "behaviours", "sim", "experiments")
+    for path in sorted((ROOT / package).rglob("*.py"))
+    if re.search(r"^ *>>> ", path.read_text(), re.MULTILINE)
+]
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_the_examples_of_docstrings_print_what_they_say(module: str) -> None:
+    found = doctest.testmod(importlib.import_module(module))
+    assert found.attempted > 0
+    assert found.failed == 0
 
 
 def headings(page: Path) -> set[str]:
