@@ -16,7 +16,8 @@ from packages import ROOT, install, python
 
 DOCS = ROOT / "docs"
 sys.path.insert(0, str(DOCS))
-from docstrings import converted  # noqa: E402 (of the site)
+from check_links import problems  # noqa: E402 (of the site)
+from docstrings import converted  # noqa: E402
 
 BLOCKS = {page.stem: re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL) for page in DOCS.glob("*.md")}
 ELSEWHERE = {
@@ -133,6 +134,26 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert other.exists(), target
         if anchor and other.suffix == ".md":
             assert anchor in headings(other), target
+
+
+def test_a_site_with_broken_links_is_told(tmp_path: Path) -> None:
+    site = tmp_path / "site"
+    site.mkdir()
+    (site / "a.html").write_text(
+        '<h1 id="top">A</h1><a href="b.html#there">b</a> <a href="#top">up</a> <img src="data:x">'
+    )
+    (site / "b.html").write_text('<p id="there"></p><a href="https://a.org">a</a> <a href="a.html#top">a</a>')
+    assert problems(site) == []
+    (site / "c.html").write_text(
+        '<a href="d.html"></a><a href="b.html#gone"></a><script src="https://a.org/x.js"></script><img src="x.png">'
+    )
+    assert problems(site) == [
+        "c.html loads https://a.org/x.js",
+        "c.html loads x.png, which is not there",
+        "c.html links to d.html, which is not there",
+        "c.html links to b.html#gone; that page has no such part",
+    ]
+    assert problems(tmp_path / "empty") == [f"{tmp_path / 'empty'} has no pages"]
 
 
 def test_every_page_is_in_the_contents() -> None:
