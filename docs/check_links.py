@@ -1,7 +1,7 @@
 """Check the site that was built: `python docs/check_links.py docs/_build/html`.
 
-Every link within the site leads to a page, and to a part of it that exists; and no page loads anything from elsewhere, so that
-the site works from a folder without a network. Prints what is wrong, and exits with 1 if anything is.
+Every link within the site leads to a page, and to a part of it that exists; and no page loads anything from elsewhere,
+so that the site works from a folder without a network. Prints what is wrong, and exits with 1 if anything is.
 """
 
 import sys
