@@ -10,6 +10,7 @@ import shlex
 import sys
 import tomllib
 from pathlib import Path
+from types import FunctionType
 
 import pytest
 from packages import ROOT, install, python
@@ -118,12 +119,36 @@ def test_the_examples_of_docstrings_print_what_they_say(module: str) -> None:
     assert found.failed == 0
 
 
+PACKAGES = [
+    "torchvsa",
+    "torchvsa.encoders",
+    "torchvsa.testing",
+    "behaviours",
+    "behaviours.data",
+    "behaviours.testing",
+    "sim",
+    "experiments.kit",
+]
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_the_reference_has_every_public_class_and_function(package: str) -> None:
+    module = importlib.import_module(package)
+    listed = re.findall(
+        r"^\.\. auto\w+:: (\S+)", "".join(map(Path.read_text, DOCS.glob("reference/*.md"))), re.MULTILINE
+    )
+    there = {path.rpartition(".")[2] for path in listed}
+    public = [name for name in module.__all__ if isinstance(getattr(module, name), type | FunctionType)]
+    assert public
+    assert [name for name in public if name not in there] == []
+
+
 def headings(page: Path) -> set[str]:
     titles = re.findall(r"^#+ (.+)$", page.read_text(), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles}
 
 
-@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md"))], ids=str)
+@pytest.mark.parametrize("page", [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.rglob("*.md"))], ids=str)
 def test_links_lead_somewhere(page: Path) -> None:
     text = re.sub(r"```.*?```|`[^`]*`", "", page.read_text(), flags=re.DOTALL)
     for target in re.findall(r"\]\(([^)\s]+)\)", text):
