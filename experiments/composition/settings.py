@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import sim
+from behaviours import Space
 from experiments.composition.rows import ROWS, rows_known
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.tasks import corral
@@ -55,6 +56,9 @@ class Composition(Combining):
 
 def check(settings: Composition) -> None:
     """Raise for settings with which something could not be learned or driven."""
+    if settings.engine != "vector":
+        raise ValueError(f"engine={settings.engine}: name the rows for the physics engine, bullet_rows=[a,b]")
+    corral.check_driving(settings, *(["bullet"] if settings.bullet_rows else []))
     check_learning(settings)
     for name in settings.arenas:
         if name not in corral.arenas():
@@ -65,14 +69,14 @@ def check(settings: Composition) -> None:
             raise ValueError(f"bullet_rows: {name} is not among the rows")
 
 
-def check_learning(settings: Combining) -> None:
-    """Raise for rules that cannot train the architecture's programs, or cannot keep silence."""
-    space = corral.space(settings)
-    parts.refuse_unsupported(parts.rule(settings.rule), space)
-    evident = parts.rule(settings.evident)
+def check_learning(settings: Combining) -> Space:
+    """The codebooks. Raises for rules that cannot train the architecture's programs, or cannot keep silence."""
+    space = corral.check_learning(settings)
+    evident = parts.rule(settings.evident, "evident")
     parts.refuse_unsupported(evident, space)
     if not evident.supports_silence:
         raise ValueError(f"evident={evident.name} cannot keep silence; choose error_driven, least_squares or evident")
+    return space
 
 
 PRESETS = {

@@ -58,6 +58,8 @@ def test_what_cannot_work_is_refused() -> None:
         (("rule@evident=one_shot",), "cannot keep silence"),
         (("arenas=[two_lamps]",), "more than one light"),
         (("rows=[teacher]", "bullet_rows=[vote]"), "vote is not among the rows"),
+        (("engine=bullet",), "engine=bullet: name the rows for the physics engine"),
+        (("body=wheeled",), "body=wheeled: engine=vector does not have it"),
     ):
         with pytest.raises(ValueError, match=message):
             check_all(study, composed(study, *overrides))
@@ -123,6 +125,8 @@ def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path, monkeypatc
     assert rules(np.array(near)).tolist() == [[-1.0, -0.5]]
     assert rules(np.array(far)).tolist() == sim.Teacher()(np.array(far)).tolist()
     assert Precedence(["avoid"])(np.array(far)).tolist() == [[0.0, 0.0]]
+    with pytest.raises(ValueError, match="no demonstration shows 'avoid'; give more of them"):
+        Precedence(["avoid"]).apart(Demonstrations(far, [[0.0, 0.0]] * len(far)))
 
 
 def test_rows_with_a_memory_are_not_asked_once_for_all() -> None:
