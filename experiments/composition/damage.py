@@ -66,6 +66,8 @@ def check(settings: Damaged) -> None:
     corral.check_driving(settings)
     if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex:
         raise ValueError(f"damage flips the signs of real numbers, of which {space.vsa.name} has none; try vsa=map_c")
+    if not space.encoder.discrete:
+        raise ValueError(f"record={settings.record['name']}: damage asks each condition once, and it has no bins")
     for name in settings.rows:
         if not line_of(name).codebooks or line_of(name).memory:
             raise ValueError(f"rows: {name} cannot be damaged, since it keeps no hypervectors or has a memory")

@@ -45,7 +45,7 @@ class Interference(Apart):
 
     arena: Part = part("arena", "default", "where programs are asked; all learn in `default`")
     rule: Part = part("rule", "error_driven", "how the programs of the sum are learned that is explained and repaired")
-    rows: list[str] = setting(list(LEARNERS), "learning rules, of those below", distinct=True, empty=True)
+    rows: list[str] = setting(list(LEARNERS), "learning rules, of those below", distinct=True)
     learners: dict[str, Any] = setting(LEARNERS, "options of a rule, by the name of a row")
     repairs: dict[str, Any] = setting(REPAIRS, "options of the rule that trains the sum further, by name")
     joint: list[int] = setting([0, 1, 2, 5, 10, 20, 50, 100], "joint samples to train the sum on", low=0, distinct=True)

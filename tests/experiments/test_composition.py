@@ -132,6 +132,8 @@ def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path, monkeypatc
 def test_rows_with_a_memory_are_not_asked_once_for_all() -> None:
     assert line_of("sequencing").memory
     assert not line_of("bundle").memory
+    with pytest.raises(ValueError, match="record=random_fourier: damage asks each condition once"):
+        check_all(damage.study, composed(damage.study, "record=random_fourier"))
     with pytest.raises(ValueError, match="cannot be damaged"):
         check_all(damage.study, composed(damage.study, "rows=[sequencing]"))
     with pytest.raises(ValueError, match="nearest_neighbour cannot be damaged"):
