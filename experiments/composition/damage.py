@@ -24,7 +24,7 @@ from behaviours import Behaviour, Bundle, Demonstrations, Gated, Policy
 from behaviours.learning import no_convergence_warnings
 from experiments.composition.measure import success_interval
 from experiments.composition.rows import Shown, demonstrated, line_of, rows_known
-from experiments.composition.settings import Combining, check_learning
+from experiments.composition.settings import Combining, check_rows
 from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Study, Table, grid, part, setting
 from experiments.kit.figures import legend_below, lines
 from experiments.kit.intervals import mean
@@ -61,7 +61,7 @@ class Damaged(Combining):
 
 def check(settings: Damaged) -> None:
     """Raise for what cannot be learned, and for rows without vectors that can be damaged."""
-    space = check_learning(settings)
+    space = check_rows(settings, settings.rows)
     corral.arena(settings.arena)
     corral.check_driving(settings)
     if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex:

@@ -59,6 +59,12 @@ def test_what_cannot_work_is_refused() -> None:
         (("arenas=[two_lamps]",), "more than one light"),
         (("rows=[teacher]", "bullet_rows=[vote]"), "vote is not among the rows"),
         (("engine=bullet",), "engine=bullet: name the rows for the physics engine"),
+        (
+            ("rows=[paper_sum]", "vsa=hrr", "rule@evident=error_driven", "rule@paper.rule=least_squares"),
+            "rows: paper_sum: .* cannot train programs of HRR",
+        ),
+        (("rows=[plain_subset_record]", "vsa=hrr", "rule@evident=error_driven"), "rows: plain_subset_record: record"),
+        (("rows=[oracle]", "record=random_fourier"), "rows: oracle: it asks each condition once"),
         (("body=wheeled",), "body=wheeled: engine=vector does not have it"),
     ):
         with pytest.raises(ValueError, match=message):
