@@ -25,6 +25,10 @@ def in_words(error: BaseException) -> str:
         return f"there is no {group} {option!r}; choose from {', '.join(options.split())}"
     if found := re.search(r"Could not find 'experiment/([^']+)'", text):
         return f"there is no experiment {found[1]!r}; this study has no presets"
+    if found := re.search(
+        r"Could not override '(.*?)'\. No match in the defaults|raised while .*: Key '(.*?)' not in", text
+    ):
+        return f"there is no setting {found[1] or found[2]!r}; --help lists those of this study"
     if found := re.search(r"Ambiguous value for argument '(.*?)=(.*?)' 1\.", text):
         return f"{found[1]}={found[2]}: a list needs brackets, {found[1]}=[{found[2]}]; a job for each needs --multirun"
     if found := re.search(r"Error parsing override '(.*?)' (.*?) See https", text):

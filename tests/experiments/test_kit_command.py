@@ -65,6 +65,8 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("repaets=1", "there is no setting 'repaets'; did you mean repeats?"),
         ("zzz=1", "there is no setting 'zzz'; choose from seed, workers, fresh, rule"),
         ("rule=nonsense", "there is no rule 'nonsense'; choose from error_driven, evident, gradient, "),
+        ("vsa=hrr", "there is no setting 'vsa'; --help lists those of this study"),
+        ("+vsa=hrr", "there is no setting 'vsa'"),
         ("rule.epoch=3", "there is no setting 'rule.epoch'; did you mean rule.epochs?"),
         ("experiment=nonsense", "there is no experiment 'nonsense'; choose from printed, quick"),
         ("+experiment=quick", "experiment"),
