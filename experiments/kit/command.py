@@ -26,7 +26,7 @@ from rich.console import Console
 from experiments.kit import run as runs
 from experiments.kit.console import wide_console
 from experiments.kit.messages import in_words
-from experiments.kit.options import register_groups
+from experiments.kit.options import refuse_no_names, register_groups
 from experiments.kit.safety import refuse_code
 from experiments.kit.study import Study
 
@@ -34,6 +34,22 @@ TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 """Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
 
 LONGEST_NAME = 80
+FLAGS = (
+    "--help",
+    "-h",
+    "--multirun",
+    "-m",
+    "--config-dir",
+    "-cd",
+    "--cfg",
+    "-c",
+    "--resolve",
+    "--package",
+    "-p",
+    "--info",
+    "-i",
+)
+"""Flags of Hydra's that a study takes; `kit.safety` refuses others that would choose another config."""
 
 # Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a
 # default must stay the object that `dataclasses` compares with.
@@ -50,10 +66,22 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
         return
     with errors_in_one_line(study.name), ended_by_signals():
         refuse_code(given)
+        refuse_unknown_flags(given)
+        refuse_no_names(given)
         register(study)
         # Hydra reads them there, and takes settings on one side of its flags only.
         sys.argv[1:] = sorted(given, key=lambda argument: argument not in ("--multirun", "-m"))
         hydra.main(version_base="1.3", config_path="pkg://experiments.kit.conf", config_name=study.name)(_Job(study))()
+
+
+def refuse_unknown_flags(arguments: Sequence[str]) -> None:
+    """Raise `ValueError` for flags that are none of Hydra's, and for settings that would be left out."""
+    for argument in arguments:
+        name = argument.partition("=")[0]
+        if name.startswith("~"):
+            raise ValueError(f"{argument}: no setting can be left out; write {name[1:]}=value")
+        if name.startswith("-") and name not in FLAGS:
+            raise ValueError(f"{argument}: there is no such flag; choose from {', '.join(FLAGS)}")
 
 
 class _Job:
@@ -145,7 +173,7 @@ def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes
     except KeyboardInterrupt:
         print(f"{name}: {stopped}", file=sys.stderr)
         sys.exit(130)
-    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError) as error:
+    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError, MemoryError) as error:
         if TRACEBACK_WANTED:
             raise
         print(f"{name}: {in_words(error)}", file=sys.stderr)

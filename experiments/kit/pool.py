@@ -5,12 +5,14 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
 from functools import lru_cache
+from multiprocessing import resource_tracker
 from typing import Any
 
 import cloudpickle
@@ -41,7 +43,9 @@ def measured(measure: Measure, material: object, cells: Sequence[Any], workers: 
     # Workers of a cluster have other parents.
     watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _backend() == "LokyBackend" else {}
     pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", **watched)
-    yield from pool(tasks)
+    with _without_interrupts():  # in which the processes start
+        found = pool(tasks)
+    yield from found
 
 
 def _backend() -> str:
@@ -96,8 +100,24 @@ def processes(workers: int) -> Iterator[Executor | None]:
     if workers == 1 or _nested():
         yield None
         return
-    # Those of an earlier call are used again. Joblib keeps one pool; one of another class would break its next call.
-    yield get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
+    with _without_interrupts():
+        # Those of an earlier call are used again. Joblib keeps one pool; one of another class would break its next
+        # call.
+        executor = get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
+        executor.submit(int)  # which starts them
+    yield executor
+
+
+@contextmanager
+def _without_interrupts() -> Iterator[None]:
+    """Processes that start in here never hear of Ctrl-C, of which they would print tracebacks; it reaches this one."""
+    # Python's tracker of shared memory, which joblib starts with them, would allow interrupts again.
+    resource_tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(parent: int) -> None:

@@ -15,6 +15,7 @@ from commands import only, results
 from counting import study
 
 from experiments.kit.command import ended_by_signals, run_study
+from experiments.kit.pool import measured, processes
 from experiments.main import main
 
 COUNTING = Path(__file__).with_name("counting.py")
@@ -64,6 +65,8 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("repaets=1", "there is no setting 'repaets'; did you mean repeats?"),
         ("zzz=1", "there is no setting 'zzz'; choose from seed, workers, fresh, rule"),
         ("rule=nonsense", "there is no rule 'nonsense'; choose from error_driven, evident, gradient, "),
+        ("vsa=hrr", "there is no setting 'vsa'; --help lists those of this study"),
+        ("+vsa=hrr", "there is no setting 'vsa'"),
         ("rule.epoch=3", "there is no setting 'rule.epoch'; did you mean rule.epochs?"),
         ("experiment=nonsense", "there is no experiment 'nonsense'; choose from printed, quick"),
         ("+experiment=quick", "experiment"),
@@ -169,6 +172,18 @@ def test_a_signal_ends_a_command_as_an_exception_does(
     assert cleaned
     assert f"{number.name}; the same command goes on from here" in capsys.readouterr().err
     assert signal.getsignal(number) == before
+
+
+def blocked(material: None, cell: int) -> bool:
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_workers_never_hear_of_an_interrupt_which_they_would_print() -> None:
+    assert dict(measured(blocked, None, [0, 1], 2)) == {0: True, 1: True}
+    with processes(2) as executor:
+        assert executor is not None
+        assert executor.submit(blocked, None, 0).result()
+    assert not blocked(None, 0)
 
 
 @pytest.mark.slow
