@@ -47,11 +47,14 @@ def check(settings: Corral) -> None:
         parts.refuse_unsupported(parts.rule(settings.paper.rule, "paper.rule"), printed_space(settings))
     if "hand_written" in settings.controllers:
         hand_written.behaviour(space.vsa, settings.seed)
+    refused: dict[str, list[str]] = {}
     for name in settings.controllers:
         try:
             corral.check_driving(driving(settings, name))
         except ValueError as error:
-            raise ValueError(f"controllers: {name} cannot drive: {error}") from error
+            refused.setdefault(str(error), []).append(name)
+    for reason, names in refused.items():
+        raise ValueError(f"controllers: {', '.join(names)} cannot drive: {reason}")
     if "ppo" in settings.controllers and find_spec("stable_baselines3") is None:
         raise ValueError("controllers: ppo needs stable-baselines3: pip install 'torchvsa[rl]'")
     if settings.demonstrations_file is not None:

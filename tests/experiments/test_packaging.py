@@ -107,9 +107,8 @@ def test_rows_that_need_pybullet_are_refused_before_anything_is_driven(installed
     done = run(installed, "-c", f"{hide}from experiments.main import main; main(['corral'])")
     assert done.returncode == 1
     (line,) = done.stderr.splitlines()
-    assert line.startswith(
-        "corral: controllers: teacher_bullet, default_bullet, teacher_wheeled drive in pybullet, which"
-    )
+    rows = "teacher_bullet, default_bullet, teacher_wheeled"
+    assert line.startswith(f"corral: controllers: {rows} cannot drive: engine=bullet needs pybullet")
     assert not (installed / "outputs" / "corral" / "default").exists()
 
 

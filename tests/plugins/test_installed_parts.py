@@ -5,13 +5,10 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import pytest
-from packages import ROOT, install, python
-
-from behaviours import POLICIES
+from packages import python
 
 USER = """
 import torch
@@ -115,14 +112,3 @@ def test_its_study_and_arena_are_commands_and_options_like_the_others(site: Path
         assert part in options
     (results,) = tmp_path.rglob("results.json")
     assert [row["gap"] for row in json.loads(results.read_text())["table"]] == [0.8, 1.4]
-
-
-@pytest.mark.slow
-def test_the_example_of_the_documentation_works(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "plugins.md").read_text()
-    module, check, user = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-    project = tomllib.loads(re.findall(r"```toml\n(.*?)```", text, re.DOTALL)[0])["project"]
-    install(tmp_path, project["name"], {"loudest": module}, project["entry-points"]["torchvsa.plugins"])
-    ran = python(tmp_path, f"{user}\n{check}", "-W", "error")
-    assert ran.returncode == 0, ran.stderr
-    assert ran.stdout == f"<class 'loudest.Loudest'> {[*POLICIES, 'loudest']}\n"
