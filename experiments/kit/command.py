@@ -7,10 +7,10 @@ import dataclasses
 import hashlib
 import os
 import re
-import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -25,15 +25,19 @@ from rich.console import Console
 
 from experiments.kit import run as runs
 from experiments.kit.console import wide_console
-from experiments.kit.messages import in_words
+from experiments.kit.messages import in_words, of_submitit
 from experiments.kit.options import register_groups
 from experiments.kit.safety import refuse_code
+from experiments.kit.signals import ended_by_signals
 from experiments.kit.study import Study
 
 TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 """Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
 
 LONGEST_NAME = 80
+
+MENDABLE = (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError)
+"""Errors that the user can mend; any other is a fault of a study, whose traceback is wanted."""
 
 # Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a
 # default must stay the object that `dataclasses` compares with.
@@ -48,7 +52,7 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
 
         print_help(study, Console())
         return
-    with errors_in_one_line(study.name), ended_by_signals():
+    with errors_in_one_line(study.name), ended_by_signals(), _jobs_waited_for():
         refuse_code(given)
         register(study)
         # Hydra reads them there, and takes settings on one side of its flags only.
@@ -81,6 +85,15 @@ class _Job:
         report = outcome.folder / "report.html"
         console.print(f"{report} shows it; results.json and records.parquet are in the same folder", soft_wrap=True)
         return None if study.objective is None else outcome.metrics.get(study.objective)
+
+
+def _jobs_waited_for() -> AbstractContextManager[None]:
+    """What sweeps with submitit need, if it is installed."""
+    if find_spec("submitit") is None:
+        return nullcontext()
+    from experiments.kit.submitit_jobs import waited_for
+
+    return waited_for()
 
 
 def register(study: Study) -> None:
@@ -145,8 +158,8 @@ def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes
     except KeyboardInterrupt:
         print(f"{name}: {stopped}", file=sys.stderr)
         sys.exit(130)
-    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError) as error:
-        if TRACEBACK_WANTED:
+    except Exception as error:
+        if TRACEBACK_WANTED or not (isinstance(error, MENDABLE) or of_submitit(error)):
             raise
         print(f"{name}: {in_words(error)}", file=sys.stderr)
         sys.exit(1)
@@ -155,19 +168,3 @@ def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes
             del os.environ["HYDRA_FULL_ERROR"]
         else:
             os.environ["HYDRA_FULL_ERROR"] = before
-
-
-@contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP end this process as an exception does, so that its workers end with it."""
-
-    def end(number: int, frame: object) -> None:
-        print(f"ended by {signal.Signals(number).name}; the same command goes on from here", file=sys.stderr)
-        raise SystemExit(128 + number)
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

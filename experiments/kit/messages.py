@@ -18,6 +18,8 @@ def in_words(error: BaseException) -> str:
             return _of_omegaconf(cause)
         cause = cause.__cause__
     text = " ".join(str(error).split())
+    if of_submitit(error) and "timed-out" in text:
+        return "a job reached its time limit, hydra.launcher.timeout_min; the same command goes on from here"
     if found := re.search(
         r"Could not find '([\w/]+)/([^'/]+)' Available options in '[\w/]+': (.*?) Config search", text
     ):
@@ -30,6 +32,11 @@ def in_words(error: BaseException) -> str:
     if found := re.search(r"Multiple values for (\w+)\.", text):
         return f"write {found[1]}=... without +"
     return text or type(error).__name__
+
+
+def of_submitit(error: BaseException) -> bool:
+    """Whether the error tells what became of a job, or why it could not be submitted."""
+    return type(error).__module__.partition(".")[0] == "submitit"
 
 
 def _of_omegaconf(error: OmegaConfBaseException) -> str:

@@ -14,7 +14,8 @@ import pytest
 from commands import only, results
 from counting import study
 
-from experiments.kit.command import ended_by_signals, run_study
+from experiments.kit.command import run_study
+from experiments.kit.signals import ended_by_signals
 from experiments.main import main
 
 COUNTING = Path(__file__).with_name("counting.py")
@@ -183,11 +184,11 @@ def test_no_worker_outlives_the_command_and_the_same_command_goes_on(
     arguments = (f"log={log}", "repeats=30", "seconds=0.3", "names=[a]")
     run = command(tmp_path, *arguments)
     deadline = time.monotonic() + 120
-    while not log.exists() or len(log.read_text().splitlines()) < 5:
-        assert time.monotonic() < deadline, "no cell was measured"
+    workers = set[int]()
+    while len(workers) < 2:
+        assert time.monotonic() < deadline, "two workers did not measure"
         time.sleep(0.1)
-    workers = {int(line.split()[1]) for line in log.read_text().splitlines()}
-    assert len(workers) == 2
+        workers = {int(line.split()[1]) for line in log.read_text().splitlines()} if log.exists() else workers
     if number == signal.SIGINT:  # as a terminal sends it: to the whole group
         os.killpg(run.pid, number)
     else:
