@@ -114,7 +114,7 @@ def primary(study: Study) -> type:
     hydra_block = {
         "run": {"dir": f"outputs/{study.name}/{folder}"},
         "sweep": {"dir": f"outputs/{study.name}/sweep", "subdir": folder},
-        "job": {"config": {"override_dirname": {"exclude_keys": ["workers", "fresh"]}}},
+        "job": {"name": study.name, "config": {"override_dirname": {"exclude_keys": ["workers", "fresh"]}}},
         "job_logging": {"root": {"level": "WARNING"}},
         "output_subdir": None,
     }

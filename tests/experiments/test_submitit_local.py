@@ -5,9 +5,9 @@ import os
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -28,6 +28,13 @@ def wait_for(reached: Callable[[], bool], seconds: float = 120) -> None:
     while not reached():
         assert time.monotonic() < deadline, "waited in vain"
         time.sleep(0.1)
+
+
+def importable(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Jobs find the study that counts; the command is as a user types it."""
+    monkeypatch.setenv("PYTHONPATH", f"{Path(__file__).parents[2]}{os.pathsep}{Path(__file__).parent}")
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    monkeypatch.setattr(sys, "argv", ["torchvsa"])
 
 
 def measured(folder: Path) -> dict[str, int]:
@@ -63,19 +70,17 @@ def test_a_sweep_goes_on_after_the_command_and_a_job_were_killed(
 
     # One job is ended, by a signal that submitit lets it ignore. The other one finishes, and the command says so.
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("PYTHONPATH", f"{Path(__file__).parents[2]}{os.pathsep}{Path(__file__).parent}")
-    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
-    monkeypatch.setattr(sys, "argv", ["torchvsa"])
+    importable(monkeypatch)
 
     def end_one() -> None:
         wait_for(lambda: bool(pids() - jobs))
         os.kill(min(pids() - jobs), signal.SIGTERM)
 
-    ending = threading.Thread(target=end_one)
-    ending.start()
-    with pytest.raises(SystemExit) as exit_:
-        run_study(study, arguments)
-    ending.join()
+    with ThreadPoolExecutor() as threads:
+        ending = threads.submit(end_one)
+        with pytest.raises(SystemExit) as exit_:
+            run_study(study, arguments)
+        ending.result()
     assert exit_.value.code == 1
     (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("counting: ")]
     assert "1 of 2 jobs ended without a result" in line
