@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import hydra
+import joblib
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
@@ -25,7 +26,7 @@ from rich.console import Console
 
 from experiments.kit import run as runs
 from experiments.kit.console import wide_console
-from experiments.kit.messages import in_words, of_submitit
+from experiments.kit.messages import in_words, of_cluster
 from experiments.kit.options import register_groups
 from experiments.kit.safety import refuse_code
 from experiments.kit.signals import ended_by_signals
@@ -75,7 +76,8 @@ class _Job:
         with errors_in_one_line(study.name) if alone else nullcontext():
             folder = Path(HydraConfig.get().runtime.output_dir)
             try:
-                outcome = runs.run(study, runs.settings_of(study, cfg), folder, console)
+                with _dask_cluster():
+                    outcome = runs.run(study, runs.settings_of(study, cfg), folder, console)
             except ValueError:
                 with suppress(OSError):
                     folder.rmdir()  # which Hydra makes, also for settings that are refused
@@ -94,6 +96,23 @@ def _jobs_waited_for() -> AbstractContextManager[None]:
     from experiments.kit.submitit_jobs import waited_for
 
     return waited_for()
+
+
+@contextmanager
+def _dask_cluster() -> Iterator[None]:
+    """The cluster at `DASK_SCHEDULER_ADDRESS`, by which Dask's own clients find one, measures the cells."""
+    address = os.environ.get("DASK_SCHEDULER_ADDRESS")
+    if not address:
+        yield
+        return
+    from dask.distributed import Client
+
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        raise OSError(f"there is no Dask scheduler at {address}, which DASK_SCHEDULER_ADDRESS names") from error
+    with client, joblib.parallel_config(backend="dask"):
+        yield
 
 
 def register(study: Study) -> None:
@@ -159,7 +178,7 @@ def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes
         print(f"{name}: {stopped}", file=sys.stderr)
         sys.exit(130)
     except Exception as error:
-        if TRACEBACK_WANTED or not (isinstance(error, MENDABLE) or of_submitit(error)):
+        if TRACEBACK_WANTED or not (isinstance(error, MENDABLE) or of_cluster(error)):
             raise
         print(f"{name}: {in_words(error)}", file=sys.stderr)
         sys.exit(1)

@@ -18,7 +18,7 @@ def in_words(error: BaseException) -> str:
             return _of_omegaconf(cause)
         cause = cause.__cause__
     text = " ".join(str(error).split())
-    if of_submitit(error) and "timed-out" in text:
+    if of_cluster(error) and "timed-out" in text:
         return "a job reached its time limit, hydra.launcher.timeout_min; the same command goes on from here"
     if found := re.search(
         r"Could not find '([\w/]+)/([^'/]+)' Available options in '[\w/]+': (.*?) Config search", text
@@ -34,9 +34,9 @@ def in_words(error: BaseException) -> str:
     return text or type(error).__name__
 
 
-def of_submitit(error: BaseException) -> bool:
-    """Whether the error tells what became of a job, or why it could not be submitted."""
-    return type(error).__module__.partition(".")[0] == "submitit"
+def of_cluster(error: BaseException) -> bool:
+    """Whether submitit or Dask tell what became of a job or a worker."""
+    return type(error).__module__.partition(".")[0] in ("submitit", "distributed")
 
 
 def _of_omegaconf(error: OmegaConfBaseException) -> str:

@@ -27,8 +27,9 @@ Measure = Callable[[Any, Any], Any]
 def measured(measure: Measure, material: object, cells: Sequence[Any], workers: int) -> Iterator[tuple[int, Any]]:
     """`measure(material, cell)` for each cell, with its place in `cells`, as they are done.
 
-    `workers` processes do the work, or those of `joblib.parallel_config`, if one is active. With one worker, and inside
-    a process of another pool (a sweep's), this process does all of it. Each works with one thread.
+    `workers` processes do the work, or those of `joblib.parallel_config`, if one is active: of a Dask cluster, all.
+    With one worker, and inside a process of another pool (a sweep's), this process does all of it. Each works with one
+    thread. Raises `ValueError` if a worker of Dask's has several threads.
     """
     if workers == 1 or _nested():
         yield from _here(measure, material, cells)
@@ -39,19 +40,25 @@ def measured(measure: Measure, material: object, cells: Sequence[Any], workers: 
     digest = hashlib.sha256(content).hexdigest()
     tasks = (joblib.delayed(_there)(packed, digest, place, cell) for place, cell in enumerate(cells))
     # Workers of a cluster have other parents.
-    watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _backend() == "LokyBackend" else {}
+    backend: Any = get_active_backend()[0]
+    watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _name(backend) == "LokyBackend" else {}
+    if _name(backend) == "DaskDistributedBackend" and max(backend.client.nthreads().values(), default=1) > 1:
+        raise ValueError("a cell needs a process of its own: start Dask's workers with one thread each, --nthreads 1")
     pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", **watched)
     yield from pool(tasks)
 
 
-def _backend() -> str:
-    """The name of the backend that joblib would use."""
-    return type(get_active_backend()[0]).__name__
+def _name(backend: object) -> str:
+    return type(backend).__name__
+
+
+_here_and_now = threading.local()
 
 
 def _nested() -> bool:
-    """Whether this is a process of another pool of joblib's."""
-    return bool(getattr(get_active_backend()[0], "nesting_level", 0))
+    """Whether this is a process of another pool of joblib's, or a worker of Dask's that measures."""
+    working = getattr(_here_and_now, "working", False)
+    return working or bool(getattr(get_active_backend()[0], "nesting_level", 0))
 
 
 def _here(measure: Measure, material: object, cells: Sequence[Any]) -> Iterator[tuple[int, Any]]:
@@ -68,7 +75,11 @@ def _here(measure: Measure, material: object, cells: Sequence[Any]) -> Iterator[
 def _there(packed: NDArray[np.uint8], digest: str, place: int, cell: Any) -> tuple[int, Any]:
     torch.set_num_threads(1)
     measure, material = _unpacked(_Packed(packed, digest))
-    return place, measure(material, cell)
+    _here_and_now.working = True
+    try:
+        return place, measure(material, cell)
+    finally:
+        _here_and_now.working = False
 
 
 class _Packed:

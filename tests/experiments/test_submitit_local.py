@@ -37,9 +37,9 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "argv", ["torchvsa"])
 
 
-def measured(folder: Path) -> dict[str, int]:
-    """How many cells each job of the sweep below a folder has measured."""
-    found = {}
+def measured(folder: Path) -> dict[int, int]:
+    """How many cells the job of each seed below a folder has measured."""
+    found: dict[int, int] = {}
     for path in folder.rglob("cells.jsonl"):
         found[json.loads(path.with_name("run.json").read_text())["config"]["seed"]] = len(path.read_text().splitlines())
     return found
