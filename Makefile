@@ -1,5 +1,5 @@
 # `make run` does everything on a fresh Linux machine with Python 3.11; `make test` is what CI runs;
-# `make docs` builds the site in docs/_build/html;
+# `make docs` builds the site in docs/_build/html, checks its links, and runs the code of all pages and docstrings;
 # `make bench` measures speed compared with peers; `make fuzz` loads 200,000 damaged files; `make combinations` drives
 # every rule x architecture x protection x record; `make release-check` builds wheel and source distribution, and
 # installs and uses them with every extra and with other Pythons, in about 15 minutes. After a change of constraints.txt,
@@ -19,6 +19,8 @@ test: $(INSTALLED) lint
 
 docs: $(INSTALLED)
 	$(BIN)/python -m sphinx -q -W --keep-going -b html docs docs/_build/html
+	$(BIN)/python docs/check_links.py docs/_build/html
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -q tests/test_site.py tests/test_readme.py
 
 bench: $(INSTALLED)
 	$(BIN)/python -m benchmarks

@@ -54,9 +54,9 @@ def to_onnx(
     Raises `ImportError` without the packages, `OSError` if the file cannot be written, and `ValueError` for complex
     codes (FHRR), which ONNX lacks, another `dtype`, and labels of an unknown actuator or not one for each level.
 
-        >>> to_onnx(bank["seek_light"], "seek_light.onnx")                                  # doctest: +SKIP
-        >>> session = onnxruntime.InferenceSession("seek_light.onnx")                       # doctest: +SKIP
-        >>> commands, similarity, *_ = session.run(None, {"readings": readings.numpy()})    # doctest: +SKIP
+        to_onnx(bank["seek_light"], "seek_light.onnx")
+        session = onnxruntime.InferenceSession("seek_light.onnx")
+        commands, similarity, *_ = session.run(None, {"readings": readings.numpy()})
     """
     labels = dict(labels or {})
     fitted: Any = behaviour

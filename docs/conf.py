@@ -36,31 +36,11 @@ html_theme_options = {"source_view_link": "", "navigation_with_keys": True}
 html_show_sphinx = False
 
 
-SECTIONS = {"studies-index": "What it answers", "running": "Run a study", "main-job": "What it measures"}
-"""Pages whose text is a section of the README."""
-
-
-def linked(text: str) -> str:
-    """Text of the README, or that links to it, with links as they are in this site."""
-    text = (
-        text.replace("](docs/", "](")
-        .replace("](../sim/arenas)", "](world.md)")
-        .replace("](../README.md)", "](start.md)")
-    )
-    for page, title in SECTIONS.items():
-        anchor = title.lower().replace(" ", "-")
-        text = text.replace(f"](../README.md#{anchor})", f"]({page}.md)").replace(f"](#{anchor})", f"]({page}.md)")
-    return text
-
-
 def read(_: object, name: str, source: list[str]) -> None:
-    """Fill the pages whose text stands elsewhere."""
+    """Fill the page of changes, and let links to the README lead to the page that starts with the same lines."""
     if name == "changelog":
-        source[0] = (ROOT / "CHANGELOG.md").read_text()
-    elif name in SECTIONS:
-        text = (ROOT / "README.md").read_text().split(f"## {SECTIONS[name]}\n")[1].split("\n## ")[0]
-        source[0] = f"# {SECTIONS[name]}\n{text}"
-    source[0] = linked(source[0])
+        source[0] = (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "](")
+    source[0] = source[0].replace("](../README.md)", "](start.md)").replace("](../sim/arenas)", "](world.md)")
 
 
 def markdown(_app: object, _kind: str, _name: str, _what: object, _options: object, lines: list[str]) -> None:

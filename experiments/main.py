@@ -9,12 +9,14 @@ from rich.table import Table
 
 import torchvsa
 from behaviours.commands.ask import ask
+from behaviours.commands.parsing import OneLineParser
 from behaviours.commands.show import show
 from experiments import studies
 from experiments.installation import shared_names
 from experiments.kit import STUDIES
 from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.console import wide_console
+from experiments.kit.markdown import write_markdown
 from experiments.kit.run import draw, load
 from experiments.own_robot.command import learn_log
 
@@ -28,9 +30,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     name, rest = given[0], given[1:]
     if name == "--version":
         print("\n".join([f"torchvsa {torchvsa.__version__}", *shared_names()]))
-        return
-    if name == "draw":
-        draw_again(rest)
         return
     if name in COMMANDS:
         with errors_in_one_line(f"torchvsa {name}", "stopped"):
@@ -81,25 +80,38 @@ def collected(arguments: Sequence[str]) -> bool:
     return False
 
 
-COMMANDS = {"learn": learn_log, "ask": asked, "show": shown, "collect": collected, "rrd": rrd_written}
+def drawn_again(arguments: Sequence[str]) -> bool:
+    """Draw the pages of finished runs again, from their results."""
+    parser = OneLineParser(prog="torchvsa draw", description="Draw the pages of finished runs again.")
+    parser.add_argument("folder", nargs="+", type=Path, help="one that holds results.json")
+    parser.add_argument("--markdown", type=Path, metavar="FILE.md", help="write the page of one run as Markdown, too")
+    given = parser.parse_args(list(arguments))
+    if given.markdown is not None and len(given.folder) > 1:
+        raise ValueError(f"--markdown {given.markdown}: name one folder; there are {len(given.folder)}")
+    studies.import_all()
+    for folder in given.folder:
+        study, outcome = load(folder)
+        page = draw(study, outcome, Console())
+        print(outcome.folder / "report.html")
+        if given.markdown is not None:
+            print(write_markdown(page, given.markdown))
+    return False
+
+
+COMMANDS = {
+    "learn": learn_log,
+    "ask": asked,
+    "show": shown,
+    "draw": drawn_again,
+    "collect": collected,
+    "rrd": rrd_written,
+}
 """What works with files; each returns whether something was wrong with what it was given."""
 
 
 def corral() -> None:
     """Run `torchvsa-corral [setting=value ...]`, which is `torchvsa corral`."""
     main(["corral", *sys.argv[1:]])
-
-
-def draw_again(arguments: Sequence[str]) -> None:
-    """Draw the pages of finished runs again, from their results."""
-    studies.import_all()
-    with errors_in_one_line("torchvsa draw"):
-        if not arguments:
-            raise ValueError("which folder? give one that holds results.json")
-        for argument in arguments:
-            study, outcome = load(Path(argument))
-            draw(study, outcome, Console())
-            print(outcome.folder / "report.html")
 
 
 def print_commands(console: Console) -> None:
@@ -113,7 +125,7 @@ def print_commands(console: Console) -> None:
     table.add_row("ask BANK [NAME]", "Answer rows of readings: CSV from a pipe, CSV with commands out.")
     table.add_row("show FILE", "Say what is in a bank or a demonstration file.")
     table.add_row("learn LOG", "Learn a behaviour from a log, compare it by run, and write a bank and a page.")
-    table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results.")
+    table.add_row("draw FOLDER", "Draw the page of a finished run again, from its results; also as Markdown.")
     table.add_row("rrd FOLDER [START ...]", "Write drives of a finished run of corral for the Rerun viewer.")
     table.add_row("collect FOLDER", "Gather the runs of a sweep, say what is missing, and compare two of them.")
     table.add_row("--version", "Print the version, and installed packages that take names of this one.")

@@ -26,7 +26,7 @@ class Registry(Mapping[str, T], Generic[T]):
         self._parts: dict[str, T] = dict(parts or {})
 
     def register(self, name: str, part: T) -> None:
-        """Add a part. Raises `ValueError` if another part has the name already.
+        """Add a part. Raises `ValueError` if another part has the name already, or the part gives itself another one.
 
         A class or function with the same module and qualified name replaces the earlier one, as when a module is
         reloaded or a notebook cell runs again.
@@ -39,6 +39,10 @@ class Registry(Mapping[str, T], Generic[T]):
                 f"there is another {self.kind} {name!r} already: {_described(other)}; {_described(part)} needs another "
                 "name"
             )
+        own = getattr(part, "name", name)
+        if isinstance(own, str) and own != name:
+            # Files hold the part's own name, and would not find it again.
+            raise ValueError(f"{_described(part)} has the name {own!r}; it cannot be registered as {name!r}")
         self._parts[name] = part
 
     def find(self, name: object) -> T:

@@ -1,14 +1,14 @@
 """`torchvsa learn LOG`: from a log to a bank, with a score by run."""
 
-import argparse
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 import numpy as np
 
 from behaviours.bank import BehaviourBank
+from behaviours.commands.parsing import OneLineParser
 from behaviours.commands.schema_file import read_schema, write_schema
 from behaviours.commands.validate import (
     LEVELS,
@@ -76,7 +76,7 @@ class Learned:
 
 def options_of(arguments: Sequence[str]) -> Options:
     """The options in these arguments of the command line. Raises `ValueError` for wrong ones."""
-    parser = _Parser(
+    parser = OneLineParser(
         prog="torchvsa learn",
         description="Learn a behaviour from a log, and compare it by run with other models.",
         epilog="torchvsa learn log.csv --sensors front left --actuators v omega --by run --output bank.safetensors",
@@ -109,11 +109,6 @@ def options_of(arguments: Sequence[str]) -> Options:
         page, given.name or given.log.stem, given.commands, as_int("--dim", given.dim, 1),
         as_int("--seed", given.seed, 0),
     )  # fmt: skip
-
-
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise ValueError(f"{message}; see torchvsa learn --help")
 
 
 def _names(given: list[str] | None) -> list[str] | None:

@@ -8,10 +8,10 @@ import math
 import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import NoReturn
 
 from rich.console import Console
 
+from behaviours.commands.parsing import OneLineParser
 from experiments.collecting import comparing, gathering, planned, runs, shown, tables
 from experiments.collecting.comparing import Comparison, Pair
 from experiments.collecting.runs import Run
@@ -21,15 +21,11 @@ MOST_ROWS = 60
 """Rows of a table on the terminal."""
 
 
-class _Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        """Raise `ValueError`, which becomes one line."""
-        raise ValueError(f"{message}; torchvsa collect --help lists what is allowed")
-
-
 def parser() -> argparse.ArgumentParser:
     """What `torchvsa collect` takes."""
-    made = _Parser(prog="torchvsa collect", description="Gather the runs below a folder, and say what is missing.")
+    made = OneLineParser(
+        prog="torchvsa collect", description="Gather the runs below a folder, and say what is missing."
+    )
     made.add_argument("folder", type=Path, help="a sweep's folder, or any folder with runs below it")
     made.add_argument("--to", type=Path, help="where the results go; FOLDER/collected by default")
     rows = "the rows of rows.parquet: all that was measured (default), or each run's table"

@@ -139,7 +139,8 @@ class Table:
         lines = [[column.title for column in self.columns]]
         lines.append(["---", *("---" if self.words else "---:" for _ in self.columns[1:])])
         lines += [[f"**{cell.text}**" if cell.mark == "best" else cell.text for cell in row] for row in self.cells]
-        return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+        bar = "\\|"  # a bar within a cell
+        return "\n".join(f"| {' | '.join(text.replace('|', bar) for text in line)} |" for line in lines)
 
 
 def aggregated(

@@ -15,7 +15,7 @@ import io
 import re
 import traceback
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
 
@@ -45,6 +45,8 @@ class Block:
     caption: str = ""
     alt: str = ""
     data: str = ""
+    file: str = ""
+    """The name of the picture's file."""
 
 
 @dataclass(frozen=True)
@@ -153,7 +155,7 @@ class Page:
             if pending.table:
                 write_atomically(figures / f"{pending.name}.csv", pending.table.encode())
         link = f"data:text/csv;base64,{base64.b64encode(pending.table.encode()).decode()}" if pending.table else ""
-        return self.picture(content, block.alt, block.caption, link)
+        return replace(self.picture(content, block.alt, block.caption, link), file=pending.file)
 
     def picture(self, content: bytes, alt: str, caption: str = "", data: str = "") -> Block:
         """A block that shows a PNG or a GIF. Raises `ValueError` for other bytes."""

@@ -1,51 +1,45 @@
 """What README and docs say about studies is true."""
 
-import io
+import json
 import re
 import tomllib
 from pathlib import Path
 
-import pandas as pd
 import pytest
 from kits import composed
 from packages import ROOT, install, python
 
 from experiments import studies
-from experiments.kit.run import config_of
-from experiments.kit.store import write_results
 from experiments.main import COMMANDS
 
-README = (ROOT / "README.md").read_text()
-COLLECT = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[-1]
+DOCS = ROOT / "docs"
+TINY = ("starts=4", "other_starts=4", "wheeled_starts=4", "demonstrations=4", "seconds=8", "workers=1", "animate=false")
 
 
+@pytest.mark.slow
 def test_a_sweep_of_the_main_job_is_collected(tmp_path: Path) -> None:
-    corral = studies.find("corral")
-    assert corral.objective is not None
-    for dim, success in ((1000, 0.25), (4000, 0.75)):
-        settings = composed(corral, f"vsa.dim={dim}")
-        content = {"config": config_of(settings), "metrics": {corral.objective: success}}
-        folder = tmp_path / "outputs" / "corral" / "sweep" / f"vsa.dim={dim}"
-        folder.mkdir(parents=True)
-        write_results(folder / "results.json", content)
-    collected = python(None, COLLECT, "-W", "error", cwd=tmp_path)
-    assert collected.returncode == 0, collected.stderr
-    printed = pd.read_csv(io.StringIO(collected.stdout), sep=r"\s+")
-    assert printed.to_numpy().tolist() == [[1000, 0, 0.25], [4000, 0, 0.75]]
+    (block,) = re.findall(r"```python\n(.*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)
+    sweep = ["corral", "--multirun", "vsa.dim=400,900", "controllers=[teacher,default]", *TINY]
+    calls = f"from experiments.main import main; main({sweep}); main(['collect', 'outputs/corral/sweep'])"
+    ran = python(None, f"{calls}\n{block}", "-W", "error", cwd=tmp_path)
+    assert ran.returncode == 0, ran.stderr
+    shown = ran.stdout[ran.stdout.index("config.vsa.dim  controller") :]
+    assert re.findall(r"(default|teacher) +[\d.]+$", shown, re.MULTILINE) == ["default", "teacher"] * 2
 
 
 def test_the_settings_of_its_commands_are_settings() -> None:
-    commands = re.findall(r"^torchvsa (\w+) (.*?)(?: +#.*)?$", README, re.MULTILINE)
+    pages = "".join((DOCS / f"{page}.md").read_text() for page in ("running", "sweeps"))
+    commands = re.findall(r"^torchvsa (\w+) (.*?)(?: +#.*)?$", pages, re.MULTILINE)
     assert len(commands) > 2
     for name, overrides in commands:
         words = [word for word in overrides.split() if "=" in word and not word.startswith("hydra")]
-        if name not in {"draw", *COMMANDS} and "--config-dir" not in overrides:
+        if name not in COMMANDS and "--config-dir" not in overrides:
             composed(studies.find(name), *(word.split(",")[0] for word in words))
 
 
 @pytest.mark.slow
 def test_the_study_and_the_arena_of_the_documentation_work(tmp_path: Path) -> None:
-    text = (ROOT / "docs" / "studies.md").read_text()
+    text = (DOCS / "studies.md").read_text()
     study, arena = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     project = tomllib.loads(re.findall(r"```toml\n(.*?)```", text, re.DOTALL)[0])["project"]
     site = tmp_path / "site"
@@ -58,8 +52,6 @@ def test_the_study_and_the_arena_of_the_documentation_work(tmp_path: Path) -> No
     ran = python(site, calls, "-W", "error", cwd=tmp_path)
     assert ran.stderr == "bundling: summands=2000: expected at most items=1000\n"
     assert "hall" in ran.stdout
-    collect = COLLECT.replace("corral", "bundling").replace("default.success_rate", "250.5.recognised")
-    printed = python(None, collect, "-W", "error", cwd=tmp_path)
-    frame = pd.read_csv(io.StringIO(printed.stdout), sep=r"\s+")
-    assert frame["config.seed"].tolist() == [0, 1], printed.stderr
-    assert min(frame["metrics.250.5.recognised"].tolist()) > 0.9
+    results = [json.loads(path.read_text()) for path in sorted(tmp_path.rglob("results.json"))]
+    assert [content["config"]["seed"] for content in results] == [0, 1]
+    assert min(content["metrics"]["250.5.recognised"] for content in results) > 0.9

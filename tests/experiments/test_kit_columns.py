@@ -1,6 +1,5 @@
-"""Tables: one declaration for terminal, page and Markdown; intervals; and the examples in the kit's docstrings."""
+"""Tables: one declaration for terminal, page and Markdown; intervals."""
 
-import doctest
 import io
 
 import numpy as np
@@ -9,7 +8,7 @@ import pytest
 from rich.console import Console
 
 import sim
-from experiments.kit import Column, Table, aggregated, columns, page, pivot, study
+from experiments.kit import Column, Table, aggregated, pivot
 from experiments.kit.figures import by_measure
 from experiments.kit.intervals import bootstrap, proportion, wilson
 
@@ -28,13 +27,6 @@ TABLE = Table(
         Column("note"),
     ],
 ).show(ROWS)
-
-
-@pytest.mark.parametrize("module", [columns, page, study])
-def test_the_examples_in_docstrings(module: object) -> None:
-    found = doctest.testmod(module)  # pyright: ignore[reportArgumentType]
-    assert found.failed == 0
-    assert found.attempted > 0
 
 
 def test_markdown_has_intervals_dashes_and_the_best_of_what_compares() -> None:

@@ -110,7 +110,11 @@ def test_the_main_command_lists_studies_and_names_what_is_not_there(
     printed = capsys.readouterr().out
     assert "capacity" in printed
     assert "draw FOLDER" in printed
-    for arguments, words in ((["nonsense"], "no study 'nonsense'"), (["draw"], "which folder?"), (["draw", "x"], "x")):
+    for arguments, words in (
+        (["nonsense"], "no study 'nonsense'"),
+        (["draw"], "required: folder"),
+        (["draw", "x"], "x"),
+    ):
         with pytest.raises(SystemExit) as exit_:
             main(arguments)
         assert exit_.value.code == 1

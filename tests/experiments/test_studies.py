@@ -49,10 +49,12 @@ def test_the_page_of_all_settings_is_up_to_date() -> None:
     assert (ROOT / "docs" / "settings.md").read_text() == studies.settings_page()
 
 
-def test_readme_and_docs_name_every_study() -> None:
-    readme = (ROOT / "README.md").read_text()
+def test_the_docs_name_every_study() -> None:
+    page = (ROOT / "docs" / "studies-index.md").read_text()
     for name in NAMES:
-        assert f"torchvsa {name}" in readme
+        assert f"| `torchvsa {name}` |" in page
+        if (ROOT / "docs" / "results" / f"{name}.md").exists():
+            assert f"| `torchvsa {name}` | [{name}](results/{name}.md) |" in page
         study = studies.find(name)
         assert groups(study.settings) is not None
         assert markdown(study).startswith(f"## {name}\n")

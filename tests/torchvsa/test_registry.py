@@ -9,6 +9,7 @@ from torchvsa.registry import Registry
 
 ALL = [ARCHITECTURES, PROTECTIONS, ENCODERS, VALUE_ENCODERS]
 VSA = torchvsa.MAP(16)
+FREE = object()
 
 
 @pytest.mark.parametrize("registry", ALL, ids=lambda registry: registry.kind)
@@ -29,11 +30,11 @@ def test_configs_with_unknown_names_list_the_choices() -> None:
 
 def test_a_name_is_given_once() -> None:
     registry: Registry[object] = Registry("part", {"one": 1})
-    registry.register("two", Level)
+    registry.register("two", FREE)
     with pytest.raises(ValueError, match="there is another part 'one' already: 1"):
         registry.register("one", 2)
-    registry.register("two", Level)  # the same part again, as when a module is imported twice
-    assert dict(registry) == {"one": 1, "two": Level}
+    registry.register("two", FREE)  # the same part again, as when a module is imported twice
+    assert dict(registry) == {"one": 1, "two": FREE}
     assert len(registry) == 2
     assert "two" in registry
     assert registry["one"] == registry.find("one") == 1
@@ -55,14 +56,23 @@ def test_an_error_names_both_parts_of_one_name() -> None:
 
 def test_a_module_may_be_loaded_again() -> None:
     """Its classes are others then, of the same module and name; of classes made in functions nobody knows."""
-    first, again = (type("Mine", (Level,), {"__module__": "mine", "__qualname__": "Mine"}) for _ in range(2))
+    first, again = (
+        type("Mine", (Level,), {"__module__": "mine", "__qualname__": "Mine", "name": "mine"}) for _ in range(2)
+    )
     registry: Registry[object] = Registry("value encoder", {"mine": first})
     registry.register("mine", again)
     assert registry.find("mine") is again
-    local, other = (type("Mine", (Level,), {"__module__": "mine", "__qualname__": "make.<locals>.Mine"}) for _ in "ab")
+    local, other = (type("Mine", (), {"__module__": "mine", "__qualname__": "make.<locals>.Mine"}) for _ in "ab")
     registry.register("local", local)
     with pytest.raises(ValueError, match="another value encoder 'local' already"):
         registry.register("local", other)
+
+
+def test_a_part_is_found_by_the_name_that_its_files_hold() -> None:
+    registry: Registry[object] = Registry("value encoder")
+    with pytest.raises(ValueError, match="Level has the name 'level'; it cannot be registered as 'mine'"):
+        registry.register("mine", Level)
+    assert "mine" not in registry
 
 
 @pytest.mark.parametrize("name", ["", None, 3])

@@ -44,7 +44,7 @@ def recall_probability(
         ValueError: There is no closed form for the architecture, or a number is out of range.
 
     >>> round(recall_probability("MAP-I", 4000, 100, 1000), 3)
-    0.996
+    0.998
     """
     score = _form(vsa, atoms, kind, raw)
     _check_counts(pairs, items, kind)
