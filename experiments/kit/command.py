@@ -29,8 +29,9 @@ from experiments.kit.console import wide_console
 from experiments.kit.messages import in_words, of_cluster
 from experiments.kit.options import register_groups
 from experiments.kit.safety import refuse_code
+from experiments.kit.settings import NO_MATTER
 from experiments.kit.signals import ended_by_signals
-from experiments.kit.study import Study
+from experiments.kit.study import Outcome, Study
 
 TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 """Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
@@ -59,6 +60,22 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
         # Hydra reads them there, and takes settings on one side of its flags only.
         sys.argv[1:] = sorted(given, key=lambda argument: argument not in ("--multirun", "-m"))
         hydra.main(version_base="1.3", config_path="pkg://experiments.kit.conf", config_name=study.name)(_Job(study))()
+
+
+def run_overrides(study: Study, overrides: Sequence[str], console: Console | None = None) -> Outcome:
+    """Run a study from Python, with overrides as on the command line, or go on with such a run.
+
+    It is in the folder that the same job of a sweep has: `outputs/<study>/sweep/<overrides>`, so that it goes on where
+    that one stopped, and the other way round. Errors are raised as they are.
+    """
+    refuse_code(overrides)
+    register(study)
+    with hydra.initialize_config_module("experiments.kit.conf", version_base="1.3"):
+        settings = runs.settings_of(study, hydra.compose(study.name, list(overrides)))
+    named = sorted(one for one in overrides if one.partition("=")[0] not in NO_MATTER)
+    folder = Path("outputs", study.name, "sweep", folder_name(",".join(named)))
+    with _dask_cluster():
+        return runs.run(study, settings, folder, console or Console(quiet=True))
 
 
 class _Job:
@@ -133,7 +150,7 @@ def primary(study: Study) -> type:
     hydra_block = {
         "run": {"dir": f"outputs/{study.name}/{folder}"},
         "sweep": {"dir": f"outputs/{study.name}/sweep", "subdir": folder},
-        "job": {"name": study.name, "config": {"override_dirname": {"exclude_keys": ["workers", "fresh"]}}},
+        "job": {"name": study.name, "config": {"override_dirname": {"exclude_keys": list(NO_MATTER)}}},
         "job_logging": {"root": {"level": "WARNING"}},
         "output_subdir": None,
     }
