@@ -30,7 +30,7 @@ from experiments.kit.messages import in_words, of_cluster
 from experiments.kit.options import register_groups
 from experiments.kit.safety import refuse_code
 from experiments.kit.settings import NO_MATTER
-from experiments.kit.signals import ended_by_signals
+from experiments.kit.signals import end_without, ended_by_signals
 from experiments.kit.study import Outcome, Study
 
 TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
@@ -83,10 +83,13 @@ class _Job:
 
     def __init__(self, study: Study) -> None:
         self.study = study
+        self.command = os.getpid()
         self.__name__ = study.name
 
     def __call__(self, cfg: DictConfig) -> float | None:
         study = self.study
+        if os.getppid() == self.command:  # in a process of joblib's, which a command that is killed leaves behind
+            end_without(self.command)
         console = wide_console()
         # A sweep goes on after a job that failed, and Hydra then says which one it was.
         alone = HydraConfig.get().mode == RunMode.RUN

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from concurrent.futures import BrokenExecutor
 
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException, ValidationError
 
@@ -20,6 +21,10 @@ def in_words(error: BaseException) -> str:
     text = " ".join(str(error).split())
     if of_cluster(error) and "timed-out" in text:
         return "a job reached its time limit, hydra.launcher.timeout_min; the same command goes on from here"
+    if isinstance(error, BrokenExecutor):
+        codes = re.search(r"exit codes of the workers are (\{.*?\})", text)
+        how = f" ({codes[1].strip('{}')})" if codes else ""
+        return f"a worker process died{how}, perhaps for lack of memory; the same command goes on from here"
     if found := re.search(
         r"Could not find '([\w/]+)/([^'/]+)' Available options in '[\w/]+': (.*?) Config search", text
     ):
@@ -35,8 +40,8 @@ def in_words(error: BaseException) -> str:
 
 
 def of_cluster(error: BaseException) -> bool:
-    """Whether submitit or Dask tell what became of a job or a worker."""
-    return type(error).__module__.partition(".")[0] in ("submitit", "distributed")
+    """Whether submitit, Dask or joblib tell what became of a job or a worker."""
+    return type(error).__module__.partition(".")[0] in ("submitit", "distributed", "joblib")
 
 
 def _of_omegaconf(error: OmegaConfBaseException) -> str:

@@ -38,14 +38,47 @@ def measured(measure: Measure, material: object, cells: Sequence[Any], workers: 
     # joblib maps a large array into its workers' memory once, instead of sending it with each cell.
     packed = np.frombuffer(content, dtype=np.uint8)
     digest = hashlib.sha256(content).hexdigest()
-    tasks = (joblib.delayed(_there)(packed, digest, place, cell) for place, cell in enumerate(cells))
-    # Workers of a cluster have other parents.
     backend: Any = get_active_backend()[0]
+    if _name(backend) == "DaskDistributedBackend":
+        yield from _on_dask(backend.client, packed, digest, cells)
+        return
+    tasks = (joblib.delayed(_there)(packed, digest, place, cell) for place, cell in enumerate(cells))
+    # Workers of another backend may have other parents.
     watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _name(backend) == "LokyBackend" else {}
-    if _name(backend) == "DaskDistributedBackend" and max(backend.client.nthreads().values(), default=1) > 1:
-        raise ValueError("a cell needs a process of its own: start Dask's workers with one thread each, --nthreads 1")
     pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", **watched)
     yield from pool(tasks)
+
+
+def _on_dask(client: Any, packed: NDArray[np.uint8], digest: str, cells: Sequence[Any]) -> Iterator[tuple[int, Any]]:
+    """The same on a Dask cluster, without joblib's queue: that one waits for ever for a cell that kills its worker."""
+    from dask.distributed import KilledWorker, as_completed
+
+    if max(client.nthreads().values(), default=1) > 1:
+        raise ValueError("a cell needs a process of its own: start Dask's workers with one thread each, --nthreads 1")
+    # What a task returns is made again if the worker that has it dies; what is scattered is lost.
+    shared = client.submit(_same, packed, pure=False)
+    tasks = [client.submit(_there, shared, digest, place, cell, pure=False) for place, cell in enumerate(cells)]
+    waiting = {task.key: (task, cell) for task, cell in zip(tasks, cells, strict=True)}
+    done = as_completed(tasks)
+    del tasks
+    try:
+        for task in done:
+            found = task.result()
+            # A result that is kept on a worker would be measured again if that worker dies.
+            del waiting[task.key]
+            task.release()
+            yield found
+    except KilledWorker as error:
+        cell = waiting[error.task][1]
+        raise ChildProcessError(
+            f"cell {cell} killed each worker that began it; the workers' logs may say why"
+        ) from error
+    finally:
+        client.cancel([task for task, _ in waiting.values()])
+
+
+def _same(packed: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return packed
 
 
 def _name(backend: object) -> str:

@@ -9,6 +9,7 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 
 
 @contextmanager
@@ -27,6 +28,7 @@ def ended_by_signals() -> Iterator[None]:
             signal.signal(number, handler)
 
 
+@cache
 def end_without(process: int) -> None:
     """End this process as soon as another one has ended, which need not be its parent. On Linux only."""
     if sys.platform != "linux":

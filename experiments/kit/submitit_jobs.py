@@ -52,7 +52,11 @@ class Executor(submitit.AutoExecutor):
 
     def map_array(self, fn: Callable[..., Any], *iterable: Iterable[Any]) -> list[Job]:
         """Submit a job for each combination of arguments, and wait for all of them."""
-        jobs = super().map_array(_OfThisCommand(fn) if self._local else fn, *iterable)
+        if self._local:
+            with _ctrl_c_ignored():
+                jobs = super().map_array(_OfThisCommand(fn), *iterable)
+        else:
+            jobs = super().map_array(fn, *iterable)
         try:
             _wait_here(jobs) if self._local else _wait_for_queue(jobs)
         except BaseException:
@@ -80,6 +84,16 @@ class _OfThisCommand:
     def checkpoint(self, *arguments: Any) -> submitit.helpers.DelayedSubmission:
         """What submitit starts again after a time limit."""
         return submitit.helpers.DelayedSubmission(self, *arguments)
+
+
+@contextmanager
+def _ctrl_c_ignored() -> Iterator[None]:
+    """Processes that begin now ignore Ctrl-C, of which they would print tracebacks; the command ends them."""
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _wait_here(jobs: Sequence[Job]) -> None:

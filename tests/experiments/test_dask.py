@@ -3,10 +3,11 @@
 import os
 import signal
 import socket
+import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import joblib
 import pandas as pd
@@ -54,7 +55,7 @@ def test_a_study_goes_on_when_a_worker_of_the_cluster_is_killed(
         killing = threads.submit(kill_one)
         run_study(study, ["repeats=6", "seconds=0.4", "drawable=false", f"log={log}"])
         killing.result()
-    assert len(pids()) == 13  # one cell was begun twice
+    assert len(pids()) in (13, 14)  # the cell that was killed, and one whose result was on its way, perhaps
     assert os.getpid() not in pids()
     (records,) = (tmp_path / "outputs").rglob("records.parquet")
     assert pd.read_parquet(records).equals(alone.records)
@@ -62,6 +63,20 @@ def test_a_study_goes_on_when_a_worker_of_the_cluster_is_killed(
     # From Python: a cell starts no pool of its own on a worker.
     with Client(cluster), joblib.parallel_config(backend="dask"):
         assert sorted(measured(pool_within, None, [3, 5], workers=2)) == [(0, (3, True)), (1, (5, True))]
+
+    # A cell that kills its workers, which share something large, ends it; no cell is left behind.
+    client: Any = Client(cluster)
+    with client, joblib.parallel_config(backend="dask"):
+        with pytest.raises(ChildProcessError, match="cell 1 killed each worker that began it"):
+            list(measured(deadly, bytes(10**6), range(20), workers=2))
+        wait_for(lambda: not any(client.processing().values()))
+
+
+def deadly(material: bytes, cell: int) -> int:
+    if cell == 1:
+        os._exit(1)
+    time.sleep(0.2)
+    return len(material)
 
 
 def pool_within(material: None, cell: int) -> tuple[int, bool]:

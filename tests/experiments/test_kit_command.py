@@ -14,7 +14,8 @@ import pytest
 from commands import only, results
 from counting import study
 
-from experiments.kit.command import run_study
+from experiments.kit.command import errors_in_one_line, run_study
+from experiments.kit.pool import measured
 from experiments.kit.signals import ended_by_signals
 from experiments.main import main
 
@@ -142,6 +143,38 @@ def test_a_sweep_of_four_jobs_two_at_a_time_and_again(tmp_path: Path, monkeypatc
     monkeypatch.setattr(sys, "argv", ["torchvsa"])
     run_study(study, [argument for argument in arguments if "launcher" not in argument])
     assert log.read_text().split() == lines
+
+
+def test_a_worker_that_dies_is_told_in_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    with pytest.raises(SystemExit) as exit_, errors_in_one_line("counting"):
+        list(measured(lambda material, cell: os._exit(3), None, [0, 1], workers=2))
+    assert exit_.value.code == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("counting: a worker process died (EXIT(3)")
+
+
+@pytest.mark.slow
+def test_no_job_of_a_sweep_outlives_a_command_that_is_killed(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.touch()
+    sweep = command(
+        tmp_path, "--multirun", "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "seed=0,1", "repeats=100",
+        "seconds=0.3", f"log={log}",
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while not log.read_text():
+        assert time.monotonic() < deadline, "no cell was measured"
+        time.sleep(0.1)
+    sweep.kill()
+    workers = {int(line.split()[1]) for line in log.read_text().splitlines()}
+    deadline = time.monotonic() + 20
+    while any(map(running, workers)):
+        assert time.monotonic() < deadline, "a job is left"
+        time.sleep(0.1)
+    sweep.communicate()
 
 
 def running(pid: int) -> bool:
