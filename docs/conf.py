@@ -7,6 +7,9 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent))
 from docstrings import converted
 
+from experiments import studies
+from experiments.kit import STUDIES
+
 ROOT = Path(__file__).parents[1]
 
 project = "torchvsa"
@@ -36,10 +39,23 @@ html_theme_options = {"source_view_link": "", "navigation_with_keys": True}
 html_show_sphinx = False
 
 
+def all_studies() -> str:
+    """Every study that is installed: its question, its settings, and its page of results if there is one."""
+    studies.import_all()
+    lines = ["", "## All studies", ""]
+    for name, study in sorted(STUDIES.items()):
+        page = f"results/{name}.md"
+        results = f", [results]({page})" if (ROOT / "docs" / page).exists() else ""
+        lines.append(f"- `torchvsa {name}`: {study.about} [Settings](settings.md#{name.replace('_', '-')}){results}")
+    return "\n".join([*lines, ""])
+
+
 def read(_: object, name: str, source: list[str]) -> None:
-    """Fill the page of changes, and let links to the README lead to the page that starts with the same lines."""
+    """Fill the pages of changes and of studies; links to the README lead to the page that starts as it does."""
     if name == "changelog":
         source[0] = (ROOT / "CHANGELOG.md").read_text().replace("](docs/", "](")
+    elif name == "studies-index":
+        source[0] += all_studies()
     source[0] = source[0].replace("](../README.md)", "](start.md)").replace("](../sim/arenas)", "](world.md)")
 
 

@@ -42,7 +42,9 @@ class Architectures(corral.Driving):
     architectures: list[str] = setting(
         [], "what is compared; none named: all that are known", choices=lambda: ARCHITECTURES, distinct=True, empty=True
     )
-    dim: int = setting(4000, "elements of a hypervector; an architecture takes the nearest number it allows", low=4)
+    dim: int = setting(
+        4000, "elements of a hypervector; an architecture takes the nearest number it allows", low=4, high=1_000_000
+    )
     encoders: list[str] = setting(
         ["level", "lookup", "thermometer"], "codes of one reading, in each record",
         choices=lambda: VALUE_ENCODERS, distinct=True,
@@ -50,7 +52,7 @@ class Architectures(corral.Driving):
     records: list[str] = setting(
         [*RECORDS, *BOTH], "what makes a condition of all readings", choices=[*RECORDS, *BOTH], distinct=True
     )
-    bins: int = setting(32, "bins of each sensor; level codes span a quarter of them", low=4)
+    bins: int = setting(32, "bins of each sensor; level codes span a quarter of them", low=4, high=1_000_000)
     protection: Part = part("protection", "none", "what is done to a condition before it is bound")
     rule: Part = part("rule", "error_driven", "how a program is learned")
     demonstrations: int = setting(20, "episodes of the teacher to learn from", low=1)
@@ -78,6 +80,7 @@ def plan(settings: Architectures, architecture: str, encoder: str) -> Encoder:
     if code == "level":
         values["span"] = settings.bins // 4
     made = parts.conditions(vsa, len(corral.schema().sensors), values, {"name": record})
+    torchvsa.protection(settings.protection, vsa)
     rule = parts.rule(settings.rule)
     if not rule.supports(vsa):
         raise ValueError(f"the rule {rule.name} cannot train programs of {architecture}")
@@ -104,7 +107,8 @@ def cells(settings: Architectures) -> list[Cell]:
 
 
 def check(settings: Architectures) -> None:
-    """Raise unless there is something to compare."""
+    """Raise unless there is something to compare, and a robot that can drive."""
+    corral.check_driving(settings)
     if not cells(settings):
         raise ValueError(
             f"records={settings.records}: no architecture supports them; "

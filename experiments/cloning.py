@@ -27,7 +27,7 @@ from sklearn.tree import DecisionTreeClassifier, DecisionTreeRegressor
 from behaviours import BehaviourClassifier, BehaviourRegressor
 from experiments.kit import Cell, Column, Drawing, Outcome, Row, Settings, Study, Table, grid, setting
 from experiments.kit.figures import legend_below, lines
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 from experiments.tasks.control import EXPERTS, run
 from experiments.tasks.seeds import seed_of
 
@@ -120,8 +120,7 @@ def summarise(settings: Cloning, records: pd.DataFrame) -> list[Row]:
         row: Row = {**cell, "rows": own.rows.mean()}
         for learner in settings.learners:
             values = own.loc[own.learner == learner, "mean_return"].to_numpy()
-            low, high = bootstrap(values)
-            row |= {learner: values.mean(), f"{learner}_low": low, f"{learner}_high": high}
+            row |= mean(learner, values)
             row[f"{learner}_s"] = own.loc[own.learner == learner, "fit_s"].median()
         expert = records[(records.task == cell["task"]) & (records.learner == EXPERT)]
         rows.append({**row, EXPERT: expert.mean_return.iloc[0], **ranks(row, settings.learners)})

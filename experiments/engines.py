@@ -19,7 +19,7 @@ import sim
 from behaviours import BehaviourBank
 from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Study, Table, grid, part, parts, setting
 from experiments.kit.figures import BLUE, VERMILION
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 from experiments.tasks import corral
 from sim import render
 
@@ -39,6 +39,14 @@ class Engines(corral.Learning):
     )  # fmt: skip
     starts: int = setting(1000, "common starts", low=2)
     demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+
+
+def check(settings: Engines) -> None:
+    """Raise for engines that cannot drive, and for what cannot be learned or combined."""
+    if settings.engine != "vector":
+        raise ValueError(f"engine={settings.engine}: this study drives in both engines")
+    corral.check_driving(settings, *sim.ENGINES)
+    corral.check_policy(corral.check_learning(settings), settings.composition)
 
 
 def cells(settings: Engines) -> list[Cell]:
@@ -98,8 +106,7 @@ def summarise(settings: Engines, records: pd.DataFrame) -> list[Row]:
             row = {**cell, "measure": measured}
             for engine in sim.ENGINES:
                 values = own.loc[own.engine == engine, measured].dropna().to_numpy()
-                low, high = bootstrap(values) if len(values) > 1 else (None, None)
-                row |= {engine: values.mean() if len(values) else None, f"{engine}_low": low, f"{engine}_high": high}
+                row |= mean(engine, values)
             table.append({**row, "agree": agree(row), "apart_m": own.apart_m.max()})
     return table
 
@@ -179,6 +186,7 @@ study = Study(
     name="engines",
     about="Does the fast engine say the same as the physics engine?",
     settings=Engines,
+    check=check,
     cells=cells,
     prepare=prepare,
     measure=measure,

@@ -113,7 +113,7 @@ def check(settings: Capacity) -> None:
     for row in settings.rows:
         if row not in settings.learners:
             raise ValueError(f"rows: there is no {row!r}; choose from {', '.join(settings.learners)}")
-        parts.refuse_unsupported(*made(settings, row, 16, settings.seed))
+        parts.refuse_unsupported(*made(settings, row, max(settings.dims), settings.seed))
 
 
 def cells(settings: Capacity) -> list[Cell]:

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 
 from experiments.kit import Column, Outcome, Row, Table, aggregated
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 
 
 def removed(own: pd.DataFrame) -> list[Row]:
@@ -23,8 +23,7 @@ def mirrors(own: pd.DataFrame) -> list[Row]:
     for program, part in groups:
         row: Row = {"program": program}
         for side in ("left", "right", "both"):
-            low, high = bootstrap(part[side].to_numpy())
-            row |= {side: part[side].mean(), f"{side}_low": low, f"{side}_high": high}
+            row |= mean(side, part[side])
         rows.append(row)
     return rows
 

@@ -24,10 +24,10 @@ from behaviours import Behaviour, Bundle, Demonstrations, Gated, Policy
 from behaviours.learning import no_convergence_warnings
 from experiments.composition.measure import success_interval
 from experiments.composition.rows import Shown, demonstrated, line_of, rows_known
-from experiments.composition.settings import Combining, check_learning
-from experiments.kit import Cell, Column, Drawing, Outcome, Row, Study, Table, grid, setting
+from experiments.composition.settings import Combining, check_rows
+from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Study, Table, grid, part, setting
 from experiments.kit.figures import legend_below, lines
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 from experiments.models.damage import Array, Damage
 from experiments.models.disturbances import Disturbed, Noisy, disturb_in_turns
 from experiments.tasks import corral
@@ -44,6 +44,7 @@ KEYS = ("row", "damage", "level")
 class Damaged(Combining):
     """The settings of this study."""
 
+    arena: Part = part("arena", "default", "where they are asked and drive; all learn in `default`")
     rows: list[str] = setting(
         ["joint_program", "evident_sum", "plain_sum", "gated", "priority", "masked_priority", "masked_sum"],
         "rows of the table, as in the study composition", choices=rows_known, distinct=True,
@@ -60,10 +61,13 @@ class Damaged(Combining):
 
 def check(settings: Damaged) -> None:
     """Raise for what cannot be learned, and for rows without vectors that can be damaged."""
-    check_learning(settings)
-    space = corral.space(settings)
+    space = check_rows(settings, settings.rows)
+    corral.arena(settings.arena)
+    corral.check_driving(settings)
     if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex:
         raise ValueError(f"damage flips the signs of real numbers, of which {space.vsa.name} has none; try vsa=map_c")
+    if not space.encoder.discrete:
+        raise ValueError(f"record={settings.record['name']}: damage asks each condition once, and it has no bins")
     for name in settings.rows:
         if not line_of(name).codebooks or line_of(name).memory:
             raise ValueError(f"rows: {name} cannot be damaged, since it keeps no hypervectors or has a memory")
@@ -167,14 +171,13 @@ def summarise(settings: Damaged, records: pd.DataFrame) -> list[Row]:
                 own = records.loc[chosen]
                 low, high = success_interval(own)
                 agreement = own.agreement.dropna().astype(float).to_numpy()
-                least, most = bootstrap(agreement) if len(agreement) > 1 else (None, None)
                 whole = float(agreement.mean()) if whole is None else whole
                 table.append(
                     {
                         "row": name, "damage": damage, "level": level, "starts": int(own.episodes.sum()),
                         "success_rate": own.successes.sum() / own.episodes.sum(), "success_low": low,
-                        "success_high": high, "agreement": float(agreement.mean()), "agreement_low": least,
-                        "agreement_high": most, "agreement_least": float(agreement.min()),
+                        "success_high": high, **mean("agreement", agreement),
+                        "agreement_least": float(agreement.min()),
                         "kept": float(agreement.mean()) / whole,
                     }
                 )  # fmt: skip

@@ -43,8 +43,9 @@ REPAIRS: dict[str, dict[str, Any]] = {
 class Interference(Apart):
     """The settings of this study."""
 
+    arena: Part = part("arena", "default", "where programs are asked; all learn in `default`")
     rule: Part = part("rule", "error_driven", "how the programs of the sum are learned that is explained and repaired")
-    rows: list[str] = setting(list(LEARNERS), "learning rules, of those below", distinct=True, empty=True)
+    rows: list[str] = setting(list(LEARNERS), "learning rules, of those below", distinct=True)
     learners: dict[str, Any] = setting(LEARNERS, "options of a rule, by the name of a row")
     repairs: dict[str, Any] = setting(REPAIRS, "options of the rule that trains the sum further, by name")
     joint: list[int] = setting([0, 1, 2, 5, 10, 20, 50, 100], "joint samples to train the sum on", low=0, distinct=True)
@@ -59,15 +60,15 @@ class Interference(Apart):
 def check(settings: Interference) -> None:
     """Raise for rules that cannot train programs of the architecture, and for ones that cannot go on from a sum."""
     corral.arena(settings.arena)
-    space = corral.space(settings)
-    parts.refuse_unsupported(parts.rule(settings.rule), space)
+    corral.check_driving(settings)
+    space = corral.check_learning(settings)
     for row in settings.rows:
         if row not in settings.learners:
             raise ValueError(f"rows: there is no {row!r}; choose from {', '.join(settings.learners)}")
-        parts.refuse_unsupported(parts.rule(settings.learners[row]), space)
+        parts.refuse_unsupported(parts.rule(settings.learners[row], f"learners.{row}"), space)
     shown = Demonstrations([[0.0, 0.0, 0.0]], [[1.0, 1.0]])
     for name, options in settings.repairs.items():
-        rule = parts.rule(options)
+        rule = parts.rule(options, f"repairs.{name}")
         try:
             rule.partial_fit(OneShot().fit(space, shown), shown)
         except ValueError as error:

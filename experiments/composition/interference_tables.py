@@ -9,7 +9,7 @@ import pandas as pd
 
 from experiments.composition.sums import KNOWERS
 from experiments.kit import Column, Outcome, Row, Table, pivot
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 
 if TYPE_CHECKING:
     from experiments.composition.interference import Interference
@@ -48,8 +48,7 @@ def agreements(part: Any) -> Row:
         known = part.dropna(subset=name)
         if len(known):
             means = known.groupby("codebook")[name].mean()
-            low, high = bootstrap(means.to_numpy())
-            row |= {name: means.mean(), f"{name}_low": low, f"{name}_high": high, f"{name}_worst": known[name].min()}
+            row |= {**mean(name, means), f"{name}_worst": known[name].min()}
             row |= {f"{name}_codebook_low": means.min(), f"{name}_codebook_high": means.max()}
     columns = [*(f"wrong_{who}" for who in KNOWERS), "alone", "corrections"]
     return row | {name: part[name].mean() for name in columns if name in part and part[name].notna().any()}

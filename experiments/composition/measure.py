@@ -17,12 +17,13 @@ from behaviours import Demonstrations, Policy
 from behaviours.learning import no_convergence_warnings
 from experiments.composition.rows import Shown, demonstrated, line_of
 from experiments.kit import Cell, Row
-from experiments.kit.intervals import bootstrap, wilson
+from experiments.kit.intervals import bootstrap
 from experiments.kit.store import write_frame
 from experiments.tasks import agreement as agreeing
 from experiments.tasks import corral
 from experiments.tasks.asked_once import AskedOnce, EachAskedOnce
 from experiments.tasks.recorded import frame_of
+from sim.statistics import wilson
 
 if TYPE_CHECKING:
     from experiments.composition.settings import Composition

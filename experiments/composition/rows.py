@@ -130,6 +130,7 @@ class Line:
         codebooks: whether it is made anew for each draw of the codebooks.
         memory: whether it has a memory.
         bank: the kind of bank that it is made of.
+        record: the name of its record, where that is not the run's.
     """
 
     make: Callable[[Shown, int], Any]
@@ -137,6 +138,7 @@ class Line:
     codebooks: bool = True
     memory: bool = False
     bank: str | None = None
+    record: str | None = None
 
 
 def together(shown: Shown, codebook: int, record: str | None = None) -> Behaviour:
@@ -166,15 +168,16 @@ def hierarchy_trained(shown: Shown, codebook: int) -> Hierarchy:
     return Hierarchy(bank, choosing(bank, shown.apart, parts.rule(shown.settings.rule)))
 
 
+def printed_space(settings: Combining, codebook: int) -> Space:
+    """One draw of the printed codebooks."""
+    printed, seed = settings.paper, settings.seed + codebook
+    encoder = {**printed.encoder, "bins": settings.encoder.get("bins", 32)}
+    return parts.space(corral.schema(), settings.vsa, encoder, printed.record, printed.protection, seed)
+
+
 def paper_sum(shown: Shown, codebook: int) -> Behaviour:
     """The printed algorithms: each program clipped at every step, and so is their sum."""
-    printed = shown.settings.paper
-    encoder = {**printed.encoder, "bins": shown.settings.encoder.get("bins", 32)}
-    space = parts.space(
-        corral.schema(), shown.settings.vsa, encoder, printed.record, printed.protection,
-        shown.settings.seed + codebook,
-    )  # fmt: skip
-    rule = parts.rule(printed.rule)
+    space, rule = printed_space(shown.settings, codebook), parts.rule(shown.settings.paper.rule)
     return Behaviour.sum([rule.fit(space, samples) for samples in shown.apart.values()]).clipped()
 
 
@@ -253,13 +256,21 @@ ROWS: dict[str, Line] = {
     "blending": plain(Blending, "commands weighted by familiarity"),
     "vote": plain(Vote, "the majority of commands"),
     "paper_sum": Line(paper_sum, "the printed algorithms: programs and sum clipped"),
-    "joint_sum_record": Line(lambda *given: together(*given, record="sum"), "joint_program with sensors bundled"),
-    "plain_sum_record": Line(lambda *given: plain_sum(*given, record="sum"), "plain_sum with sensors bundled"),
+    "joint_sum_record": Line(
+        lambda *given: together(*given, record="sum"), "joint_program with sensors bundled", record="sum"
+    ),
+    "plain_sum_record": Line(
+        lambda *given: plain_sum(*given, record="sum"), "plain_sum with sensors bundled", record="sum"
+    ),
     "joint_subset_record": Line(
-        lambda *given: together(*given, record="subset_product"), "joint_program with a subset of sensors per element"
+        lambda *given: together(*given, record="subset_product"),
+        "joint_program with a subset of sensors per element",
+        record="subset_product",
     ),
     "plain_subset_record": Line(
-        lambda *given: plain_sum(*given, record="subset_product"), "plain_sum with a subset of sensors per element"
+        lambda *given: plain_sum(*given, record="subset_product"),
+        "plain_sum with a subset of sensors per element",
+        record="subset_product",
     ),
 }
 """All rows by name."""

@@ -22,7 +22,7 @@ from behaviours import Demonstrations, ErrorDriven
 from behaviours.learning import no_convergence_warnings
 from experiments.composition import sequence_paths
 from experiments.kit import Cell, Column, Drawing, Outcome, Page, Row, Settings, Study, Table, grid, setting
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 from experiments.kit.study import plain_page
 from experiments.tasks import corral
 from experiments.tasks import two_lamps as task
@@ -149,8 +149,7 @@ def summarise(settings: Sequence, records: pd.DataFrame) -> list[Row]:
             row = {**cell, "row": name, **corral.success(len(own), int(own.success.sum()))}
             if name == VECTOR and cell["engine"] == "vector":
                 shares = own.groupby("codebook").agreement.first()
-                low, high = bootstrap(shares.to_numpy())
-                row |= {"agreement": shares.mean(), "agreement_low": low, "agreement_high": high}
+                row |= mean("agreement", shares)
             table.append(row)
     return table
 

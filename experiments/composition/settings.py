@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
 import sim
-from experiments.composition.rows import ROWS, rows_known
+from behaviours import Space
+from experiments.composition.rows import ROWS, line_of, printed_space, rows_known
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.tasks import corral
 from experiments.tasks.behaviours import BEHAVIOURS
@@ -55,7 +57,10 @@ class Composition(Combining):
 
 def check(settings: Composition) -> None:
     """Raise for settings with which something could not be learned or driven."""
-    check_learning(settings)
+    if settings.engine != "vector":
+        raise ValueError(f"engine={settings.engine}: name the rows for the physics engine, bullet_rows=[a,b]")
+    corral.check_driving(settings, *(["bullet"] if settings.bullet_rows else []))
+    check_rows(settings, settings.rows)
     for name in settings.arenas:
         if name not in corral.arenas():
             known = ", ".join(corral.arenas())
@@ -65,14 +70,30 @@ def check(settings: Composition) -> None:
             raise ValueError(f"bullet_rows: {name} is not among the rows")
 
 
-def check_learning(settings: Combining) -> None:
-    """Raise for rules that cannot train the architecture's programs, or cannot keep silence."""
-    space = corral.space(settings)
-    parts.refuse_unsupported(parts.rule(settings.rule), space)
-    evident = parts.rule(settings.evident)
+def check_rows(settings: Combining, names: Iterable[str]) -> Space:
+    """The codebooks. Raises for rows that could not be learned or asked."""
+    space = check_learning(settings)
+    for name in names:
+        try:
+            if (record := line_of(name).record) is not None:
+                corral.check_learning(replace(settings, record={"name": record}))
+            if name == "paper_sum":
+                parts.refuse_unsupported(parts.rule(settings.paper.rule, "paper.rule"), printed_space(settings, 0))
+            if name == "oracle" and not space.encoder.discrete:
+                raise ValueError(f"it asks each condition once, and record={settings.record['name']} has no bins")
+        except ValueError as error:
+            raise ValueError(f"rows: {name}: {error}") from error
+    return space
+
+
+def check_learning(settings: Combining) -> Space:
+    """The codebooks. Raises for rules that cannot train the architecture's programs, or cannot keep silence."""
+    space = corral.check_learning(settings)
+    evident = parts.rule(settings.evident, "evident")
     parts.refuse_unsupported(evident, space)
     if not evident.supports_silence:
         raise ValueError(f"evident={evident.name} cannot keep silence; choose error_driven, least_squares or evident")
+    return space
 
 
 PRESETS = {

@@ -16,7 +16,7 @@ from experiments.composition.measure import measure, prepare, success_interval
 from experiments.composition.rows import line_of
 from experiments.composition.settings import PRESETS, Composition, check
 from experiments.kit import Cell, Column, Drawing, Outcome, Page, Row, Study, Table, grid
-from experiments.kit.intervals import bootstrap
+from experiments.kit.intervals import mean
 from experiments.kit.study import plain_page
 
 
@@ -42,9 +42,7 @@ def summarise(settings: Composition, records: pd.DataFrame) -> list[Row]:
             }  # fmt: skip
             if cell["engine"] == "vector":
                 for column in ("agreement", "agreement_avoid", "agreement_distinct"):
-                    row |= {column: own[column].mean()}
-                    low, high = bootstrap(own[column].to_numpy()) if len(own) > 1 else (None, None)
-                    row |= {f"{column}_low": low, f"{column}_high": high, f"{column}_least": own[column].min()}
+                    row |= {**mean(column, own[column].dropna()), f"{column}_least": own[column].min()}
                 row["ceiling"] = own.ceiling.iloc[0]
             table.append(row)
     order = [*settings.rows, *(f"{name}_bullet" for name in settings.bullet_rows)]

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from importlib.util import find_spec
 
-import sim
-from behaviours import BehaviourBank, Demonstrations, OneShot
 from experiments.corral.controllers import CONTROLLERS, DEFAULT_ROWS, driving, original, printed_space
 from experiments.kit import Part, part, parts, setting, settings
 from experiments.models import hand_written
@@ -12,7 +10,7 @@ from experiments.tasks import corral
 
 
 @dataclass
-class Corral(corral.Learning):
+class Corral(corral.InOneArena):
     """The settings of this study."""
 
     composition: Part = part("composition", "bundle", "how the row bundled combines its three behaviours")
@@ -39,25 +37,21 @@ class Corral(corral.Learning):
 
 def check(settings: Corral) -> None:
     """Raise for settings with which something could not be built, learned or combined."""
-    space, rule = corral.space(settings), parts.rule(settings.rule)
+    space = corral.space(settings)
     corral.arena(settings.arena)
     if {"default", "bundled"} & set(map(original, settings.controllers)):
-        parts.refuse_unsupported(rule, space)
+        corral.check_learning(settings)
     if "bundled" in settings.controllers:
-        bank = BehaviourBank(space)
-        for name in sim.BEHAVIOURS:
-            bank.learn(name, Demonstrations([[0.0, 0.0, 0.0]], [[1.0, 1.0]]), OneShot())
-        parts.policy(bank, settings.composition)
+        corral.check_policy(space, settings.composition)
     if {"paper", "paper_best_bins"} & set(settings.controllers):
-        parts.refuse_unsupported(parts.rule(settings.paper.rule), printed_space(settings))
+        parts.refuse_unsupported(parts.rule(settings.paper.rule, "paper.rule"), printed_space(settings))
     if "hand_written" in settings.controllers:
         hand_written.behaviour(space.vsa, settings.seed)
-    bullet = [name for name in settings.controllers if driving(settings, name).engine == "bullet"]
-    if bullet and find_spec("pybullet") is None:
-        raise ValueError(
-            f"controllers: {', '.join(bullet)} drive in pybullet, which is there for Python 3.11 only: pip install "
-            "'torchvsa[sim]', or leave them out"
-        )
+    for name in settings.controllers:
+        try:
+            corral.check_driving(driving(settings, name))
+        except ValueError as error:
+            raise ValueError(f"controllers: {name} cannot drive: {error}") from error
     if "ppo" in settings.controllers and find_spec("stable_baselines3") is None:
         raise ValueError("controllers: ppo needs stable-baselines3: pip install 'torchvsa[rl]'")
     if settings.demonstrations_file is not None:

@@ -80,7 +80,7 @@ MAIN = Table(
             about="median time of one answer for one robot, on the machine that ran this, with its workers busy",
         ),
     ],
-    "Green: the best of its column, without the teachers, and only where all were measured on the same starts: success "
+    "Marked: the best of its column, without the teachers, and only where all were measured on the same starts: success "
     "is compared in the column `common`, times only if all drove as many starts. Orange: less than half of the "
     "episodes succeed. Agreement: share of samples for which the controller commands what the teacher did, without "
     "those after the lamp was reached, since a robot at rest repeats one condition and would flatter every learner.",

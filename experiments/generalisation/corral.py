@@ -36,7 +36,16 @@ from experiments.generalisation.corral_results import FIGURE, HOME, TEACHER, hea
 from experiments.kit import Cell, Part, Row, Study, part, parts, setting, settings
 from experiments.models.baselines import CLASSIFIERS, Classified
 from experiments.tasks.agreement import right
-from experiments.tasks.corral import FIRST_DEMONSTRATION, Driving, arenas, drive, drive_together, moving, shown_in
+from experiments.tasks.corral import (
+    FIRST_DEMONSTRATION,
+    Driving,
+    arenas,
+    check_driving,
+    drive,
+    drive_together,
+    moving,
+    shown_in,
+)
 
 
 @dataclass
@@ -85,6 +94,7 @@ class Generalisation(Driving):
 
 def check(settings: Generalisation) -> None:
     """Raise for what cannot be run."""
+    check_driving(settings)
     counts, draws = settings.demonstrations, settings.draws
     if counts != sorted(counts):
         raise ValueError(f"demonstrations are growing numbers; got {counts}")

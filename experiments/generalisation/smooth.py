@@ -21,7 +21,16 @@ from behaviours import Demonstrations
 from experiments.kit import Cell, Column, Drawing, Outcome, Row, Study, Table, aggregated, setting
 from experiments.kit.figures import BLACK, GREEN, VERMILION
 from experiments.models.regressors import LEVELS, OURS, REGRESSORS, RegressorController, errors, regressor
-from experiments.tasks.corral import FIRST_DEMONSTRATION, Driving, drive, drive_together, driven, moving, success
+from experiments.tasks.corral import (
+    FIRST_DEMONSTRATION,
+    Driving,
+    check_driving,
+    drive,
+    drive_together,
+    driven,
+    moving,
+    success,
+)
 from experiments.tasks.smooth_corral import corral_commands
 from experiments.tasks.wall_following import FOLDS, blocks, samples, wall_commands
 
@@ -217,6 +226,7 @@ study = Study(
     name="smooth",
     about="How close does one hypervector come to wheel commands that take any value?",
     settings=Smooth,
+    check=check_driving,
     cells=cells,
     prepare=prepare,
     measure=measure,

@@ -27,7 +27,7 @@ from rich.console import Console
 from experiments.kit import run as runs
 from experiments.kit.console import wide_console
 from experiments.kit.messages import in_words, of_cluster
-from experiments.kit.options import register_groups
+from experiments.kit.options import refuse_no_names, register_groups
 from experiments.kit.safety import refuse_code
 from experiments.kit.settings import NO_MATTER
 from experiments.kit.signals import end_without, ended_by_signals
@@ -37,8 +37,24 @@ TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 """Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
 
 LONGEST_NAME = 80
+FLAGS = (
+    "--help",
+    "-h",
+    "--multirun",
+    "-m",
+    "--config-dir",
+    "-cd",
+    "--cfg",
+    "-c",
+    "--resolve",
+    "--package",
+    "-p",
+    "--info",
+    "-i",
+)
+"""Flags of Hydra's that a study takes; `kit.safety` refuses others that would choose another config."""
 
-MENDABLE = (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError)
+MENDABLE = (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError, MemoryError)
 """Errors that the user can mend; any other is a fault of a study, whose traceback is wanted."""
 
 # Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a
@@ -56,6 +72,8 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
         return
     with errors_in_one_line(study.name), ended_by_signals(), _jobs_waited_for():
         refuse_code(given)
+        refuse_unknown_flags(given)
+        refuse_no_names(given)
         register(study)
         # Hydra reads them there, and takes settings on one side of its flags only.
         sys.argv[1:] = sorted(given, key=lambda argument: argument not in ("--multirun", "-m"))
@@ -69,6 +87,7 @@ def run_overrides(study: Study, overrides: Sequence[str], console: Console | Non
     that one stopped, and the other way round. Errors are raised as they are.
     """
     refuse_code(overrides)
+    refuse_no_names(overrides)
     register(study)
     with hydra.initialize_config_module("experiments.kit.conf", version_base="1.3"):
         settings = runs.settings_of(study, hydra.compose(study.name, list(overrides)))
@@ -76,6 +95,16 @@ def run_overrides(study: Study, overrides: Sequence[str], console: Console | Non
     folder = Path("outputs", study.name, "sweep", folder_name(",".join(named)))
     with _dask_cluster():
         return runs.run(study, settings, folder, console or Console(quiet=True))
+
+
+def refuse_unknown_flags(arguments: Sequence[str]) -> None:
+    """Raise `ValueError` for flags that are none of Hydra's, and for settings that would be left out."""
+    for argument in arguments:
+        name = argument.partition("=")[0]
+        if name.startswith("~"):
+            raise ValueError(f"{argument}: no setting can be left out; write {name[1:]}=value")
+        if name.startswith("-") and name not in FLAGS:
+            raise ValueError(f"{argument}: there is no such flag; choose from {', '.join(FLAGS)}")
 
 
 class _Job:

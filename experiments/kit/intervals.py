@@ -6,31 +6,33 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 LEVEL = 0.95
 
 
-def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Wilson's interval (low, high) for a proportion. Raises `ValueError` unless 0 <= successes <= trials, trials > 0.
-
-    Source: Wilson 1927.
-    """
-    from scipy import stats  # takes half a second to load
-
-    found = stats.binomtest(successes, trials).proportion_ci(LEVEL, method="wilson")
-    return float(found.low), float(found.high)
-
-
 def proportion(name: str, successes: int, trials: int) -> dict[str, Any]:
-    """Columns of a row: `{name}_rate`, `{name}_low` and `{name}_high`; None if there were no trials."""
+    """Columns of a row: `{name}_rate`, `{name}_low` and `{name}_high`, Wilson's; None if there were no trials."""
+    from sim.statistics import wilson  # with the robot, which takes half a second to load
+
     columns = (f"{name}_rate", f"{name}_low", f"{name}_high")
     if not trials:
         return dict.fromkeys(columns)
     return dict(zip(columns, (successes / trials, *wilson(successes, trials)), strict=True))
 
 
+def mean(name: str, values: ArrayLike) -> dict[str, Any]:
+    """Columns of a row: the mean of draws as `{name}`, and its bootstrap as `{name}_low` and `{name}_high`.
+
+    The bounds of a single draw are None, and so is all of none.
+    """
+    drawn = np.asarray(values, dtype=np.float64)
+    low, high = bootstrap(drawn) if len(drawn) > 1 else (None, None)
+    return {name: float(drawn.mean()) if len(drawn) else None, f"{name}_low": low, f"{name}_high": high}
+
+
 def bootstrap(
-    values: Sequence[float], statistic: Callable[..., Any] = np.mean, seed: int = 0, draws: int = 2000
+    values: ArrayLike, statistic: Callable[..., Any] = np.mean, seed: int = 0, draws: int = 2000
 ) -> tuple[float, float]:
     """The percentile interval (low, high) of a statistic over independent draws, e.g. codebooks, starts or folds.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import inspect
+import re
 import types
 import typing
 from collections.abc import Callable, Iterable, Mapping
@@ -81,6 +82,15 @@ def options(group: str) -> list[str]:
     parts = [option_name(name) for name, part in found.parts.items() if found.only(part)]
     presets = sorted(path.stem for path in (CONFIGS / group).glob("*.yaml"))
     return list(dict.fromkeys([*parts, *presets]))
+
+
+def refuse_no_names(arguments: Iterable[str]) -> None:
+    """Raise `ValueError` for an override of a group that names no option; Hydra would not say which group it was."""
+    for argument in arguments:
+        key, _, value = argument.partition("=")
+        group = key.lstrip("+").partition("@")[0]
+        if group in GROUPS and re.fullmatch(r"['\"]*|null|true|false|\[.*|[-+.\d].*", value):
+            raise ValueError(f"{argument}: expected an option of {group}: {', '.join(options(group))}")
 
 
 def described_option(group: str, option: str) -> list[tuple[str, str, str]]:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Mapping
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any, TypeVar
 
 import torchvsa
 from behaviours import POLICIES, RULES, BehaviourBank, Policy, Rule, Schema, Space
 from experiments.kit.options import takes
+from experiments.kit.settings import written
 from torchvsa import VSA
 from torchvsa.encoders import ENCODERS, VALUE_ENCODERS, Encoder, value_encoder
 from torchvsa.registry import Registry
@@ -29,12 +32,15 @@ def space(
 ) -> Space:
     """Codebooks for the options of these groups; `command_codes` names the value encoder of the actuators' levels."""
     known_only("vsa", vsa, torchvsa.ARCHITECTURES.find(vsa["name"]))
-    algebra = torchvsa.architecture(**vsa)
+    with _named("vsa", vsa):
+        algebra = torchvsa.architecture(**vsa)
+    with _named("protection", protection):
+        protect = torchvsa.protection(protection, algebra)
     levels = max(actuator.levels for actuator in schema.actuators)
     return Space(
         schema,
         conditions(algebra, len(schema.sensors), encoder, record),
-        protection=torchvsa.protection(protection, algebra),
+        protection=protect,
         seed=seed,
         command_codes=value_encoder({"name": command_codes, "bins": levels}, algebra),
     )
@@ -56,9 +62,9 @@ def conditions(vsa: VSA, sensors: int, encoder: Options, record: Options) -> Enc
     return _made("record", ENCODERS, record, vsa, sensors)
 
 
-def rule(options: Options) -> Rule:
-    """The learning rule of the group `rule`."""
-    return _made("rule", RULES, options)
+def rule(options: Options, setting: str = "rule") -> Rule:
+    """The learning rule of the group `rule`; errors name the `setting` that chose it."""
+    return _made(setting, RULES, options)
 
 
 def policy(bank: BehaviourBank, options: Options) -> Policy:
@@ -82,4 +88,17 @@ def known_only(group: str, options: Options, part: Callable[..., object]) -> Non
 def _made(group: str, registry: Registry[Callable[..., T]], options: Options, *arguments: Any) -> T:
     made = registry.find(options["name"])
     known_only(group, options, made)
-    return made(*arguments, **{key: value for key, value in options.items() if key != "name"})
+    with _named(group, options):
+        return made(*arguments, **{key: value for key, value in options.items() if key != "name"})
+
+
+@contextmanager
+def _named(group: str, options: Options) -> Iterator[None]:
+    """Name the setting in errors of a part, which knows no settings: the first option of which they speak."""
+    try:
+        yield
+    except ValueError as error:
+        spoken = (name for name in options if name != "name" and re.search(rf"\b{name}\b", str(error)))
+        option = next(spoken, None)
+        setting = group if option is None else f"{group}.{option}={written(options[option])}"
+        raise ValueError(f"{setting}: {error}") from error

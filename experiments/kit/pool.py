@@ -21,6 +21,8 @@ from joblib.executor import get_memmapping_executor
 from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
 
+from experiments.kit.signals import without_interrupts
+
 Measure = Callable[[Any, Any], Any]
 
 
@@ -46,7 +48,9 @@ def measured(measure: Measure, material: object, cells: Sequence[Any], workers: 
     # Workers of another backend may have other parents.
     watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _name(backend) == "LokyBackend" else {}
     pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", **watched)
-    yield from pool(tasks)
+    with without_interrupts():  # in which the processes start
+        found = pool(tasks)
+    yield from found
 
 
 def _on_dask(client: Any, packed: NDArray[np.uint8], digest: str, cells: Sequence[Any]) -> Iterator[tuple[int, Any]]:
@@ -140,8 +144,12 @@ def processes(workers: int) -> Iterator[Executor | None]:
     if workers == 1 or _nested():
         yield None
         return
-    # Those of an earlier call are used again. Joblib keeps one pool; one of another class would break its next call.
-    yield get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
+    with without_interrupts():
+        # Those of an earlier call are used again. Joblib keeps one pool; one of another class would break its next
+        # call.
+        executor = get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
+        executor.submit(int)  # which starts them
+    yield executor
 
 
 def _begin(parent: int) -> None:

@@ -18,6 +18,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+MOST = 2**31 - 1
+"""The largest whole number of any setting. Every library takes it, as a seed, too."""
+
 Part = Any
 """The type of a field that holds the chosen option of a config group: a mapping with a `name` and its options."""
 
@@ -75,7 +78,7 @@ class Settings:
     """What every study can be told."""
 
     seed: int = setting(0, "seed of everything that is drawn", low=0)
-    workers: int = setting(2, "processes that work side by side; no result depends on it", low=1)
+    workers: int = setting(2, "processes that work side by side; no result depends on it", low=1, high=1000)
     fresh: bool = setting(False, "begin anew, also where an earlier run of these settings can go on")
 
 
@@ -112,13 +115,17 @@ def check(given: object, prefix: str = "") -> None:
     """Raise `ValueError`, naming the setting, its value and what is allowed, unless all settings are allowed."""
     for field in dataclasses.fields(given):  # pyright: ignore[reportArgumentType] (a dataclass)
         name, value, metadata = prefix + field.name, getattr(given, field.name), field.metadata
+        if "settings" in metadata and value is None:
+            raise ValueError(f"{name}=null: it holds settings; write {name}.setting=value")
         if "settings" in metadata:
             check(value, f"{name}.")
-        elif "group" in metadata and isinstance(value, str):
+        elif "group" in metadata and not isinstance(value, Mapping | None):
             raise ValueError(f"{name}={value}: to choose an option, write {metadata['group']}@{name}={value}")
         elif "group" in metadata and value is None and metadata["option"] is not None:
             raise ValueError(f"{name} is missing; choose an option of {metadata['group']}")
         elif "allowed" in metadata:
+            if isinstance(value, list) and "list[list" not in str(field.type) and any(map(_nested, value)):
+                raise ValueError(f"{name}={written(value)}: expected a list without lists in it")
             _check(name, value, metadata)
 
 
@@ -131,8 +138,11 @@ def _check(name: str, value: object, metadata: Mapping[str, Any]) -> None:
             continue
         if choices is not None and entry not in choices:
             raise ValueError(f"{name}: there is no {entry!r}; choose from {', '.join(map(str, choices))}")
+        if isinstance(entry, int) and entry > MOST and allowed["high"] is None:
+            raise ValueError(f"{name}={written(value)}: expected at most {MOST}")
         if isinstance(entry, int | float) and not _within(entry, allowed):
-            raise ValueError(f"{name}={written(value)}: expected {_expected(allowed)}")
+            finite = "" if math.isfinite(entry) else "a finite number, "
+            raise ValueError(f"{name}={written(value)}: expected {finite}{_expected(allowed)}")
     if not isinstance(value, list):
         return
     if metadata["distinct"]:
@@ -142,6 +152,10 @@ def _check(name: str, value: object, metadata: Mapping[str, Any]) -> None:
     if not entries and not metadata["empty"]:
         what = "name at least one" if choices is None else f"choose from {', '.join(map(str, choices))}"
         raise ValueError(f"{name} is empty; {what}")
+
+
+def _nested(entry: object) -> bool:
+    return isinstance(entry, list | dict)
 
 
 def _within(number: float, allowed: Mapping[str, Any]) -> bool:
@@ -160,11 +174,11 @@ def _expected(allowed: Mapping[str, Any]) -> str:
         return ", ".join(map(str, _listed(allowed["choices"])))
     low, high, above, below = (allowed[end] for end in ("low", "high", "above", "below"))
     if low is not None and high is not None:
-        return f"a number from {low:g} to {high:g}"
-    words = [f"{low:g} or more"] if low is not None else []
-    words += [f"more than {above:g}"] if above is not None else []
-    words += [f"at most {high:g}"] if high is not None else []
-    words += [f"less than {below:g}"] if below is not None else []
+        return f"a number from {low:.12g} to {high:.12g}"
+    words = [f"{low:.12g} or more"] if low is not None else []
+    words += [f"more than {above:.12g}"] if above is not None else []
+    words += [f"at most {high:.12g}"] if high is not None else []
+    words += [f"less than {below:.12g}"] if below is not None else []
     return " and ".join(words) or "a finite number"
 
 

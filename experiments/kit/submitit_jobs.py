@@ -18,7 +18,7 @@ from typing import Any
 
 import submitit
 
-from experiments.kit.signals import end_without, ended_by_signals
+from experiments.kit.signals import end_without, ended_by_signals, without_interrupts
 
 Job = submitit.Job[Any]
 
@@ -53,7 +53,7 @@ class Executor(submitit.AutoExecutor):
     def map_array(self, fn: Callable[..., Any], *iterable: Iterable[Any]) -> list[Job]:
         """Submit a job for each combination of arguments, and wait for all of them."""
         if self._local:
-            with _ctrl_c_ignored():
+            with without_interrupts():
                 jobs = super().map_array(_OfThisCommand(fn), *iterable)
         else:
             jobs = super().map_array(fn, *iterable)
@@ -84,16 +84,6 @@ class _OfThisCommand:
     def checkpoint(self, *arguments: Any) -> submitit.helpers.DelayedSubmission:
         """What submitit starts again after a time limit."""
         return submitit.helpers.DelayedSubmission(self, *arguments)
-
-
-@contextmanager
-def _ctrl_c_ignored() -> Iterator[None]:
-    """Processes that begin now ignore Ctrl-C, of which they would print tracebacks; the command ends them."""
-    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, before)
 
 
 def _wait_here(jobs: Sequence[Job]) -> None:

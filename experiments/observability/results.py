@@ -71,7 +71,7 @@ def tables(outcome: Outcome) -> list[Table]:
     for name in dict.fromkeys(row["disturbance"] for row in table):
         rows = [row for row in table if row["disturbance"] == name]
         title = f"{name.capitalize()}: agreement / balanced agreement / success"
-        about = f"By {DISTURBANCES[name].axis}; success, if robots drove. Green: the highest balanced agreement."
+        about = f"By {DISTURBANCES[name].axis}; success, if robots drove. Marked: the highest balanced agreement."
         found.append(pivot(title, rows, [Column("learner")], Column("label"), value, about))
     learners = [{"learner": name, "about": LEARNERS[name].about} for name in outcome.settings.learners]
     found.append(Table("Learners", [Column("learner"), Column("about", "what it is")], words=True).show(learners))

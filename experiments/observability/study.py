@@ -54,10 +54,10 @@ class Strengths:
 
 
 @dataclass
-class Observability(corral.Learning):
+class Observability(corral.InOneArena):
     """The settings of this study. `rule` is that of `default`; the others follow the gradient."""
 
-    seconds: float = setting(40.0, "longest duration of an episode, s", above=0)
+    seconds: float = setting(40.0, "longest duration of an episode, s", low=1 / sim.CONTROL_HZ)
     learners: list[str] = setting(
         list(LEARNERS), "rows, in this order; `hold` and `held_trace` only where readings have gaps",
         choices=LEARNERS, distinct=True,
@@ -88,9 +88,9 @@ def check(settings: Observability) -> None:
             raise ValueError(f"strengths.{name} grow from 0 (undisturbed) on; got {strengths}")
     for lags in settings.lags:
         check_lags(lags)
-    space = corral.space(settings)
-    for rule in (parts.rule(settings.rule), disturbed_rule(settings)):
-        parts.refuse_unsupported(rule, space)
+    corral.arena(settings.arena)
+    corral.check_driving(settings)
+    parts.refuse_unsupported(disturbed_rule(settings), corral.check_learning(settings))
 
 
 def disturbances(settings: Observability, name: str) -> list[Disturbance]:

@@ -14,7 +14,7 @@ BLOCK = 512
 
 def refuse_undamageable(space: Space) -> None:
     """Raise `ValueError` for codebooks whose elements cannot be damaged: without signs, or without a table of codes."""
-    if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex:
+    if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex or not space.vsa.negatable:
         raise ValueError(
             f"robustness damages signed numbers, of which {space.vsa.name} has none; try vsa=map_c or vsa=hrr"
         )

@@ -35,7 +35,7 @@ TEACHER = "teacher"
 
 
 @dataclass
-class Robustness(corral.Learning):
+class Robustness(corral.InOneArena):
     """The settings of this study; those of `Learning` are the learner `default`."""
 
     one_shot: corral.Printed = settings(
@@ -72,6 +72,8 @@ def check(settings: Robustness) -> None:
         raise ValueError(f"shares begin with 0 and rise; got {shares}")
     if unknown := [share for share in settings.drive_shares if share not in shares]:
         raise ValueError(f"drive_shares are some of the shares {shares}; got {unknown}")
+    corral.arena(settings.arena)
+    corral.check_driving(settings)
     for name, options in (("default", settings), ("one_shot", settings.one_shot)):
         if name in settings.learners:
             space = space_of(settings, options)

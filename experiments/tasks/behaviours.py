@@ -53,8 +53,7 @@ class Precedence:
     def apart(self, shown: Demonstrations) -> dict[str, Demonstrations]:
         """The samples in which each behaviour fires first. Raises `ValueError` for one without any."""
         first = self.first(shown.sensors.numpy())
-        found = {name: shown.where(first == number) for number, name in enumerate(self.names)}
-        for name, samples in found.items():
-            if not len(samples):
-                raise ValueError(f"no demonstration shows {name!r}; give it more of them (demonstrations=...)")
-        return found
+        for number, name in enumerate(self.names):
+            if not (first == number).any():
+                raise ValueError(f"no demonstration shows {name!r}; give more of them (demonstrations=...)")
+        return {name: shown.where(first == number) for number, name in enumerate(self.names)}

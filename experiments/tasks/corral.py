@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from rich.progress import Progress
 
 import sim
-from behaviours import Actuator, Behaviour, Demonstrations, Schema, Sensor, Space
+from behaviours import Actuator, Behaviour, BehaviourBank, Demonstrations, OneShot, Schema, Sensor, Space
 from behaviours.controller import Controller
 from experiments.kit import Part, Settings, part, parts, setting
 from experiments.kit.intervals import proportion
@@ -20,6 +21,7 @@ from experiments.kit.options import GROUPS, Group
 from experiments.kit.pool import processes
 from experiments.tasks.asked_once import AskedOnce
 from experiments.tasks.behaviours import Precedence
+from sim.engines import find_engine
 
 COMMAND_LEVELS = 3
 """Levels that a learner tells apart on each wheel: backward, stop, forward."""
@@ -53,7 +55,7 @@ class Driving(Settings):
 
     engine: str = setting("vector", "what moves the robots: bullet is the truth, vector is fast", choices=sim.ENGINES)
     body: str = setting("planar", "the robot's body; wheeled in bullet only", choices=sim.BODIES)
-    seconds: float = setting(60.0, "longest duration of an episode, s", above=0)
+    seconds: float = setting(60.0, "longest duration of an episode, s", low=1 / sim.CONTROL_HZ)
     robots: int | None = setting(
         None, "robots per process at once; null for 4,096, and for 64 in bullet, where each has 29 MB", low=1
     )
@@ -61,13 +63,19 @@ class Driving(Settings):
 
 @dataclass
 class Learning(Driving):
-    """What a program is made with, and where it drives."""
+    """What a program is made with."""
 
     vsa: Part = part("vsa", "map_c", "the architecture")
     encoder: Part = part("encoder", "level", "the code of one reading")
     record: Part = part("record", "product", "how the codes of all sensors become a condition")
     protection: Part = part("protection", "none", "what is done to a condition before it is bound")
     rule: Part = part("rule", "error_driven", "how a program is learned")
+
+
+@dataclass
+class InOneArena(Learning):
+    """The same, for a study that knows one arena."""
+
     arena: Part = part("arena", "default", "the corral")
 
 
@@ -107,6 +115,32 @@ def space(settings: Learning, bins: int | None = None) -> Space:
     """Codebooks for the groups `vsa`, `encoder`, `record` and `protection`; `bins` replaces those of the encoder."""
     encoder = settings.encoder if bins is None else {**settings.encoder, "bins": bins}
     return parts.space(schema(), settings.vsa, encoder, settings.record, settings.protection, settings.seed)
+
+
+def check_driving(settings: Driving, *engines: str) -> None:
+    """Raise for an engine of the run, or one of these, that is not installed, or does not have the body."""
+    for engine in dict.fromkeys((settings.engine, *engines)):
+        if engine == "bullet" and find_spec("pybullet") is None:
+            raise ValueError(
+                "engine=bullet needs pybullet, which is there for Python 3.11 only: pip install 'torchvsa[sim]'"
+            )
+        if settings.body not in find_engine(engine).bodies:
+            raise ValueError(f"body={settings.body}: engine={engine} does not have it; choose engine=bullet")
+
+
+def check_learning(settings: Learning) -> Space:
+    """The codebooks of the run. Raises unless its rule can train programs over them."""
+    found = space(settings)
+    parts.refuse_unsupported(parts.rule(settings.rule), found)
+    return found
+
+
+def check_policy(space: Space, composition: parts.Options) -> None:
+    """Raise for options of a policy that it does not take, over the teacher's behaviours."""
+    bank = BehaviourBank(space)
+    for name in sim.BEHAVIOURS:
+        bank.learn(name, Demonstrations([[0.0, 0.0, 0.0]], [[1.0, 1.0]]), OneShot())
+    parts.policy(bank, composition)
 
 
 def arena(options: parts.Options) -> sim.Arena:

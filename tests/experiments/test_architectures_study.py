@@ -27,7 +27,7 @@ def test_what_is_not_supported_is_left_out_with_the_reason() -> None:
 
 def test_nothing_to_compare_is_refused() -> None:
     settings = composed(architectures.study, "architectures=[VTB]", "records=[subset_product]")
-    with pytest.raises(ValueError, match="no architecture supports them; a subset of sensors per dimension"):
+    with pytest.raises(ValueError, match="no architecture supports them; record: a subset of sensors per dimension"):
         check_all(architectures.study, settings)
 
 

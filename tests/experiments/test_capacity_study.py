@@ -126,6 +126,8 @@ def test_the_closed_form_is_that_of_a_raw_sum() -> None:
         ("rows=[]", "rows is empty"),
         ("dims=[100,100]", "dims names 100 2 times"),
         ("dims=[0]", r"dims=\[0\]: expected 1 or more"),
+        ("dims=[100,2000000000]", "of memory"),
+        ("dims=[[1]]", r"dims=\[\[1\]\]: expected a list without lists"),
         ("pairs=[9000]", r"pairs=\[9000\]: expected a number from 1 to 8000"),
         ("accuracy=1.0", "accuracy=1: expected more than 0 and less than 1"),
         ("learners.Gradient.codes.record=secret", "no encoder 'secret'"),

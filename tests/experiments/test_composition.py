@@ -58,6 +58,14 @@ def test_what_cannot_work_is_refused() -> None:
         (("rule@evident=one_shot",), "cannot keep silence"),
         (("arenas=[two_lamps]",), "more than one light"),
         (("rows=[teacher]", "bullet_rows=[vote]"), "vote is not among the rows"),
+        (("engine=bullet",), "engine=bullet: name the rows for the physics engine"),
+        (
+            ("rows=[paper_sum]", "vsa=hrr", "rule@evident=error_driven", "rule@paper.rule=least_squares"),
+            "rows: paper_sum: .* cannot train programs of HRR",
+        ),
+        (("rows=[plain_subset_record]", "vsa=hrr", "rule@evident=error_driven"), "rows: plain_subset_record: record"),
+        (("rows=[oracle]", "record=random_fourier"), "rows: oracle: it asks each condition once"),
+        (("body=wheeled",), "body=wheeled: engine=vector does not have it"),
     ):
         with pytest.raises(ValueError, match=message):
             check_all(study, composed(study, *overrides))
@@ -123,11 +131,15 @@ def test_behaviours_and_policies_of_ones_own_are_rows(tmp_path: Path, monkeypatc
     assert rules(np.array(near)).tolist() == [[-1.0, -0.5]]
     assert rules(np.array(far)).tolist() == sim.Teacher()(np.array(far)).tolist()
     assert Precedence(["avoid"])(np.array(far)).tolist() == [[0.0, 0.0]]
+    with pytest.raises(ValueError, match="no demonstration shows 'avoid'; give more of them"):
+        Precedence(["avoid"]).apart(Demonstrations(far, [[0.0, 0.0]] * len(far)))
 
 
 def test_rows_with_a_memory_are_not_asked_once_for_all() -> None:
     assert line_of("sequencing").memory
     assert not line_of("bundle").memory
+    with pytest.raises(ValueError, match="record=random_fourier: damage asks each condition once"):
+        check_all(damage.study, composed(damage.study, "record=random_fourier"))
     with pytest.raises(ValueError, match="cannot be damaged"):
         check_all(damage.study, composed(damage.study, "rows=[sequencing]"))
     with pytest.raises(ValueError, match="nearest_neighbour cannot be damaged"):

@@ -9,7 +9,7 @@ from rich.console import Console
 
 import sim
 from experiments.engines import agree, before_touch, study
-from experiments.kit.run import run
+from experiments.kit.run import check_all, run
 
 
 def test_both_engines_drive_from_the_same_starts(tmp_path: Path) -> None:
@@ -40,3 +40,17 @@ def test_paths_count_until_either_robot_touches_something() -> None:
     touched = [int(np.argmax(arena.touched(path.x, path.y))) or len(path) for path in runs]
     assert before_touch(arena, *runs) == pytest.approx(apart[: min(touched)].max())
     assert before_touch(arena, runs[0], runs[0]) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (["engine=bullet"], "engine=bullet: this study drives in both engines"),
+        (["body=wheeled"], "body=wheeled: engine=vector does not have it"),
+        (["vsa=hrr", "rule=least_squares"], "the rule least_squares cannot train programs of HRR"),
+        (["composition.weights={nobody:1}"], "composition.weights={nobody}: .*nobody"),
+    ],
+)
+def test_what_cannot_work_is_refused_before_anything_is_driven(overrides: list[str], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        check_all(study, composed(study, *overrides))

@@ -95,8 +95,9 @@ def test_conditions_are_known_by_those_who_were_shown_them(given: sums.Material)
     ("overrides", "words"),
     [
         (["rows=[nobody]"], "rows: there is no 'nobody'; choose from one_shot, error_driven_0"),
+        (["rows=[]"], "rows is empty; name at least one"),
         (["vsa=hrr"], "the rule least_squares cannot train programs of HRR"),
-        (["repairs.margin_0.name=least_squares"], "there is no setting 'rule.margin'"),
+        (["repairs.margin_0.name=least_squares"], "there is no setting 'repairs.margin_0.margin'"),
         (["+repairs.once={name:one_shot}"], "repairs.once: novelty='exact' needs all earlier conditions"),
         (["sources=[nowhere]"], "sources: there is no 'nowhere'"),
     ],

@@ -6,11 +6,11 @@ import numpy as np
 import pandas as pd
 import pytest
 from rich.console import Console
+from scipy import stats
 
-import sim
 from experiments.kit import Column, Table, aggregated, pivot
 from experiments.kit.figures import by_measure
-from experiments.kit.intervals import bootstrap, proportion, wilson
+from experiments.kit.intervals import bootstrap, mean, proportion
 
 ROWS = [
     {"name": "a", "rate": 0.5, "low": 0.25, "high": 0.75, "starts": 10, "seconds": 3.0, "note": None},
@@ -57,17 +57,24 @@ def test_nothing_is_best_among_equals_or_on_other_samples() -> None:
 
 
 @pytest.mark.parametrize(("successes", "trials"), [(0, 7), (3, 7), (7, 7), (999, 1000)])
-def test_wilsons_interval_is_that_of_the_simulator(successes: int, trials: int) -> None:
-    assert wilson(successes, trials) == pytest.approx(sim.wilson(successes, trials), abs=1e-12)
-    row = proportion("success", successes, trials)
-    assert row == {"success_rate": successes / trials, "success_low": wilson(successes, trials)[0],
-                   "success_high": wilson(successes, trials)[1]}  # fmt: skip
+def test_a_proportion_has_wilsons_interval(successes: int, trials: int) -> None:
+    found = stats.binomtest(successes, trials).proportion_ci(0.95, method="wilson")
+    expected = {"success_rate": successes / trials, "success_low": found.low, "success_high": found.high}
+    assert proportion("success", successes, trials) == pytest.approx(expected, abs=1e-12)
 
 
 def test_no_trials_have_no_interval() -> None:
     assert proportion("x", 0, 0) == {"x_rate": None, "x_low": None, "x_high": None}
-    with pytest.raises(ValueError):  # noqa: PT011
-        wilson(2, 1)
+    with pytest.raises(ValueError, match="2 successes of 1"):
+        proportion("x", 2, 1)
+
+
+def test_a_mean_has_the_bootstrap_of_several_draws_and_none_of_one() -> None:
+    low, high = bootstrap([1.0, 2.0, 6.0])
+    assert mean("x", pd.Series([1, 2, 6])) == {"x": 3.0, "x_low": low, "x_high": high}
+    assert 1 <= low < 3 < high <= 6
+    assert mean("x", [2.5]) == {"x": 2.5, "x_low": None, "x_high": None}
+    assert mean("x", []) == {"x": None, "x_low": None, "x_high": None}
 
 
 def test_the_bootstrap_covers_the_mean_about_as_often_as_it_says() -> None:

@@ -15,7 +15,7 @@ from commands import only, results
 from counting import study
 
 from experiments.kit.command import errors_in_one_line, run_study
-from experiments.kit.pool import measured
+from experiments.kit.pool import measured, processes
 from experiments.kit.signals import ended_by_signals
 from experiments.main import main
 
@@ -66,6 +66,8 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("repaets=1", "there is no setting 'repaets'; did you mean repeats?"),
         ("zzz=1", "there is no setting 'zzz'; choose from seed, workers, fresh, rule"),
         ("rule=nonsense", "there is no rule 'nonsense'; choose from error_driven, evident, gradient, "),
+        ("vsa=hrr", "there is no setting 'vsa'; --help lists those of this study"),
+        ("+vsa=hrr", "there is no setting 'vsa'"),
         ("rule.epoch=3", "there is no setting 'rule.epoch'; did you mean rule.epochs?"),
         ("experiment=nonsense", "there is no experiment 'nonsense'; choose from printed, quick"),
         ("+experiment=quick", "experiment"),
@@ -77,11 +79,14 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("hydra.searchpath=[pkg://os]", "could run code"),
         ("--config-name=other", "a study has its own config"),
         ("--config-dir=mine", "mine/experiment/evil.yaml: _target_ could run code"),
+        ("--config-dir=lines", "lines/cluster.yaml: setup could run code"),
     ],
 )
 def test_one_line_names_what_is_wrong(refused: Callable[..., str], tmp_path: Path, arguments: str, words: str) -> None:
     (tmp_path / "mine" / "experiment").mkdir(parents=True)
     (tmp_path / "mine" / "experiment" / "evil.yaml").write_text("hydra: {launcher: {_target_: os.system}}\n")
+    (tmp_path / "lines").mkdir()
+    (tmp_path / "lines" / "cluster.yaml").write_text("hydra: {launcher: {setup: [rm -r x]}}\n")
     line = refused(*arguments.split())
     assert line.startswith("counting: ")
     assert words in line
@@ -203,6 +208,18 @@ def test_a_signal_ends_a_command_as_an_exception_does(
     assert cleaned
     assert f"{number.name}; the same command goes on from here" in capsys.readouterr().err
     assert signal.getsignal(number) == before
+
+
+def blocked(material: None, cell: int) -> bool:
+    return signal.SIGINT in signal.pthread_sigmask(signal.SIG_BLOCK, [])
+
+
+def test_workers_never_hear_of_an_interrupt_which_they_would_print() -> None:
+    assert dict(measured(blocked, None, [0, 1], 2)) == {0: True, 1: True}
+    with processes(2) as executor:
+        assert executor is not None
+        assert executor.submit(blocked, None, 0).result()
+    assert not blocked(None, 0)
 
 
 @pytest.mark.slow

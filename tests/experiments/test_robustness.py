@@ -37,6 +37,7 @@ def settings(*overrides: str) -> Robustness:
         ("kept=0", "kept=0: expected more than 0 and at most 1"),
         # Programs without signs, a rule that does not fit, and codes without a table.
         ("vsa=bsc", "BSC has none; try vsa=map_c"),
+        ("vsa=bsdc_s", "BSDC-S has none; try vsa=map_c"),
         ("one_shot.rule.name=guess", "no learning rule 'guess'"),
         ("record=threshold_features", "threshold_features has none .* try encoder=level record=product"),
     ],
