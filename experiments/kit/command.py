@@ -7,14 +7,15 @@ import dataclasses
 import hashlib
 import os
 import re
-import signal
 import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import hydra
+import joblib
 from hydra.core.config_store import ConfigStore
 from hydra.core.hydra_config import HydraConfig
 from hydra.errors import HydraException
@@ -25,10 +26,12 @@ from rich.console import Console
 
 from experiments.kit import run as runs
 from experiments.kit.console import wide_console
-from experiments.kit.messages import in_words
+from experiments.kit.messages import in_words, of_cluster
 from experiments.kit.options import refuse_no_names, register_groups
 from experiments.kit.safety import refuse_code
-from experiments.kit.study import Study
+from experiments.kit.settings import NO_MATTER
+from experiments.kit.signals import end_without, ended_by_signals
+from experiments.kit.study import Outcome, Study
 
 TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
 """Whether the user asked Hydra for whole tracebacks, read before this module sets the same variable."""
@@ -51,6 +54,9 @@ FLAGS = (
 )
 """Flags of Hydra's that a study takes; `kit.safety` refuses others that would choose another config."""
 
+MENDABLE = (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError, MemoryError)
+"""Errors that the user can mend; any other is a fault of a study, whose traceback is wanted."""
+
 # Dataclasses of a script or a notebook travel to the processes of a sweep by value. What marks a field without a
 # default must stay the object that `dataclasses` compares with.
 copyreg.pickle(type(dataclasses.MISSING), lambda missing: "MISSING")
@@ -64,7 +70,7 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
 
         print_help(study, Console())
         return
-    with errors_in_one_line(study.name), ended_by_signals():
+    with errors_in_one_line(study.name), ended_by_signals(), _jobs_waited_for():
         refuse_code(given)
         refuse_unknown_flags(given)
         refuse_no_names(given)
@@ -72,6 +78,23 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
         # Hydra reads them there, and takes settings on one side of its flags only.
         sys.argv[1:] = sorted(given, key=lambda argument: argument not in ("--multirun", "-m"))
         hydra.main(version_base="1.3", config_path="pkg://experiments.kit.conf", config_name=study.name)(_Job(study))()
+
+
+def run_overrides(study: Study, overrides: Sequence[str], console: Console | None = None) -> Outcome:
+    """Run a study from Python, with overrides as on the command line, or go on with such a run.
+
+    It is in the folder that the same job of a sweep has: `outputs/<study>/sweep/<overrides>`, so that it goes on where
+    that one stopped, and the other way round. Errors are raised as they are.
+    """
+    refuse_code(overrides)
+    refuse_no_names(overrides)
+    register(study)
+    with hydra.initialize_config_module("experiments.kit.conf", version_base="1.3"):
+        settings = runs.settings_of(study, hydra.compose(study.name, list(overrides)))
+    named = sorted(one for one in overrides if one.partition("=")[0] not in NO_MATTER)
+    folder = Path("outputs", study.name, "sweep", folder_name(",".join(named)))
+    with _dask_cluster():
+        return runs.run(study, settings, folder, console or Console(quiet=True))
 
 
 def refuse_unknown_flags(arguments: Sequence[str]) -> None:
@@ -89,17 +112,21 @@ class _Job:
 
     def __init__(self, study: Study) -> None:
         self.study = study
+        self.command = os.getpid()
         self.__name__ = study.name
 
     def __call__(self, cfg: DictConfig) -> float | None:
         study = self.study
+        if os.getppid() == self.command:  # in a process of joblib's, which a command that is killed leaves behind
+            end_without(self.command)
         console = wide_console()
         # A sweep goes on after a job that failed, and Hydra then says which one it was.
         alone = HydraConfig.get().mode == RunMode.RUN
         with errors_in_one_line(study.name) if alone else nullcontext():
             folder = Path(HydraConfig.get().runtime.output_dir)
             try:
-                outcome = runs.run(study, runs.settings_of(study, cfg), folder, console)
+                with _dask_cluster():
+                    outcome = runs.run(study, runs.settings_of(study, cfg), folder, console)
             except ValueError:
                 with suppress(OSError):
                     folder.rmdir()  # which Hydra makes, also for settings that are refused
@@ -109,6 +136,32 @@ class _Job:
         report = outcome.folder / "report.html"
         console.print(f"{report} shows it; results.json and records.parquet are in the same folder", soft_wrap=True)
         return None if study.objective is None else outcome.metrics.get(study.objective)
+
+
+def _jobs_waited_for() -> AbstractContextManager[None]:
+    """What sweeps with submitit need, if it is installed."""
+    if find_spec("submitit") is None:
+        return nullcontext()
+    from experiments.kit.submitit_jobs import waited_for
+
+    return waited_for()
+
+
+@contextmanager
+def _dask_cluster() -> Iterator[None]:
+    """The cluster at `DASK_SCHEDULER_ADDRESS`, by which Dask's own clients find one, measures the cells."""
+    address = os.environ.get("DASK_SCHEDULER_ADDRESS")
+    if not address:
+        yield
+        return
+    from dask.distributed import Client
+
+    try:
+        client = Client(address)
+    except (OSError, ValueError) as error:
+        raise OSError(f"there is no Dask scheduler at {address}, which DASK_SCHEDULER_ADDRESS names") from error
+    with client, joblib.parallel_config(backend="dask"):
+        yield
 
 
 def register(study: Study) -> None:
@@ -129,7 +182,7 @@ def primary(study: Study) -> type:
     hydra_block = {
         "run": {"dir": f"outputs/{study.name}/{folder}"},
         "sweep": {"dir": f"outputs/{study.name}/sweep", "subdir": folder},
-        "job": {"config": {"override_dirname": {"exclude_keys": ["workers", "fresh"]}}},
+        "job": {"name": study.name, "config": {"override_dirname": {"exclude_keys": list(NO_MATTER)}}},
         "job_logging": {"root": {"level": "WARNING"}},
         "output_subdir": None,
     }
@@ -173,8 +226,8 @@ def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes
     except KeyboardInterrupt:
         print(f"{name}: {stopped}", file=sys.stderr)
         sys.exit(130)
-    except (HydraException, OmegaConfBaseException, ValueError, TypeError, OSError, ImportError, MemoryError) as error:
-        if TRACEBACK_WANTED:
+    except Exception as error:
+        if TRACEBACK_WANTED or not (isinstance(error, MENDABLE) or of_cluster(error)):
             raise
         print(f"{name}: {in_words(error)}", file=sys.stderr)
         sys.exit(1)
@@ -183,19 +236,3 @@ def errors_in_one_line(name: str, stopped: str = "stopped; the same command goes
             del os.environ["HYDRA_FULL_ERROR"]
         else:
             os.environ["HYDRA_FULL_ERROR"] = before
-
-
-@contextmanager
-def ended_by_signals() -> Iterator[None]:
-    """SIGTERM and SIGHUP end this process as an exception does, so that its workers end with it."""
-
-    def end(number: int, frame: object) -> None:
-        print(f"ended by {signal.Signals(number).name}; the same command goes on from here", file=sys.stderr)
-        raise SystemExit(128 + number)
-
-    before = {number: signal.signal(number, end) for number in (signal.SIGTERM, signal.SIGHUP)}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
+from concurrent.futures import BrokenExecutor
 
 from omegaconf.errors import ConfigAttributeError, ConfigKeyError, OmegaConfBaseException, ValidationError
 
@@ -18,6 +19,12 @@ def in_words(error: BaseException) -> str:
             return _of_omegaconf(cause)
         cause = cause.__cause__
     text = " ".join(str(error).split())
+    if of_cluster(error) and "timed-out" in text:
+        return "a job reached its time limit, hydra.launcher.timeout_min; the same command goes on from here"
+    if isinstance(error, BrokenExecutor):
+        codes = re.search(r"exit codes of the workers are (\{.*?\})", text)
+        how = f" ({codes[1].strip('{}')})" if codes else ""
+        return f"a worker process died{how}, perhaps for lack of memory; the same command goes on from here"
     if found := re.search(
         r"Could not find '([\w/]+)/([^'/]*)' Available options in '[\w/]+': (.*?) Config search", text
     ):
@@ -36,6 +43,11 @@ def in_words(error: BaseException) -> str:
     if found := re.search(r"Multiple values for (\w+)\.", text):
         return f"write {found[1]}=... without +"
     return text or type(error).__name__
+
+
+def of_cluster(error: BaseException) -> bool:
+    """Whether submitit, Dask or joblib tell what became of a job or a worker."""
+    return type(error).__module__.partition(".")[0] in ("submitit", "distributed", "joblib")
 
 
 def _of_omegaconf(error: OmegaConfBaseException) -> str:

@@ -11,6 +11,9 @@ import yaml
 FORBIDDEN = ("_target_", "hydra.callbacks", "hydra/callbacks", "hydra.searchpath", "()")
 """What an override may not contain: a name of code, or a place where Hydra would import something."""
 
+SHELL = ("setup", "additional_parameters")
+"""Settings of launchers that become lines of a shell script: for the command line, not for files of presets."""
+
 LOGGING = ("hydra.job_logging", "hydra.hydra_logging")
 """Python's logging makes objects of the classes that its configuration names."""
 
@@ -37,7 +40,11 @@ def _refuse_in(path: Path) -> None:
         raise ValueError(f"{path}: {error}") from error
     for key in _keys(content):
         if found := next(
-            (word for word in (*FORBIDDEN, "callbacks", "searchpath", "job_logging", "hydra_logging") if word in key),
+            (
+                word
+                for word in (*FORBIDDEN, *SHELL, "callbacks", "searchpath", "job_logging", "hydra_logging")
+                if word in key
+            ),
             None,
         ):
             raise ValueError(f"{path}: {found} could run code that a setting names; no setting may")

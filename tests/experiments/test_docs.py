@@ -18,7 +18,8 @@ TINY = ("starts=4", "other_starts=4", "wheeled_starts=4", "demonstrations=4", "s
 
 @pytest.mark.slow
 def test_a_sweep_of_the_main_job_is_collected(tmp_path: Path) -> None:
-    (block,) = re.findall(r"```python\n(.*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)
+    blocks = re.findall(r"```python\n(.*?)```", (DOCS / "sweeps.md").read_text(), re.DOTALL)
+    (block,) = [block for block in blocks if "read_parquet" in block]
     sweep = ["corral", "--multirun", "vsa.dim=400,900", "controllers=[teacher,default]", *TINY]
     calls = f"from experiments.main import main; main({sweep}); main(['collect', 'outputs/corral/sweep'])"
     ran = python(None, f"{calls}\n{block}", "-W", "error", cwd=tmp_path)

@@ -14,8 +14,9 @@ import pytest
 from commands import only, results
 from counting import study
 
-from experiments.kit.command import ended_by_signals, run_study
+from experiments.kit.command import errors_in_one_line, run_study
 from experiments.kit.pool import measured, processes
+from experiments.kit.signals import ended_by_signals
 from experiments.main import main
 
 COUNTING = Path(__file__).with_name("counting.py")
@@ -78,11 +79,14 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
         ("hydra.searchpath=[pkg://os]", "could run code"),
         ("--config-name=other", "a study has its own config"),
         ("--config-dir=mine", "mine/experiment/evil.yaml: _target_ could run code"),
+        ("--config-dir=lines", "lines/cluster.yaml: setup could run code"),
     ],
 )
 def test_one_line_names_what_is_wrong(refused: Callable[..., str], tmp_path: Path, arguments: str, words: str) -> None:
     (tmp_path / "mine" / "experiment").mkdir(parents=True)
     (tmp_path / "mine" / "experiment" / "evil.yaml").write_text("hydra: {launcher: {_target_: os.system}}\n")
+    (tmp_path / "lines").mkdir()
+    (tmp_path / "lines" / "cluster.yaml").write_text("hydra: {launcher: {setup: [rm -r x]}}\n")
     line = refused(*arguments.split())
     assert line.startswith("counting: ")
     assert words in line
@@ -146,6 +150,38 @@ def test_a_sweep_of_four_jobs_two_at_a_time_and_again(tmp_path: Path, monkeypatc
     assert log.read_text().split() == lines
 
 
+def test_a_worker_that_dies_is_told_in_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    with pytest.raises(SystemExit) as exit_, errors_in_one_line("counting"):
+        list(measured(lambda material, cell: os._exit(3), None, [0, 1], workers=2))
+    assert exit_.value.code == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("counting: a worker process died (EXIT(3)")
+
+
+@pytest.mark.slow
+def test_no_job_of_a_sweep_outlives_a_command_that_is_killed(tmp_path: Path) -> None:
+    log = tmp_path / "log"
+    log.touch()
+    sweep = command(
+        tmp_path, "--multirun", "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", "seed=0,1", "repeats=100",
+        "seconds=0.3", f"log={log}",
+    )  # fmt: skip
+    deadline = time.monotonic() + 120
+    while not log.read_text():
+        assert time.monotonic() < deadline, "no cell was measured"
+        time.sleep(0.1)
+    sweep.kill()
+    workers = {int(line.split()[1]) for line in log.read_text().splitlines()}
+    deadline = time.monotonic() + 20
+    while any(map(running, workers)):
+        assert time.monotonic() < deadline, "a job is left"
+        time.sleep(0.1)
+    sweep.communicate()
+
+
 def running(pid: int) -> bool:
     with contextlib.suppress(OSError):
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
@@ -202,11 +238,12 @@ def test_no_worker_outlives_the_command_and_the_same_command_goes_on(
     arguments = (f"log={log}", "repeats=30", "seconds=0.3", "names=[a]")
     run = command(tmp_path, *arguments)
     deadline = time.monotonic() + 120
-    while not log.exists() or len(log.read_text().splitlines()) < 5:
-        assert time.monotonic() < deadline, "no cell was measured"
+    pids: list[int] = []
+    while len(pids) < 5 or len(set(pids)) < 2:
+        assert time.monotonic() < deadline, "two workers did not measure"
         time.sleep(0.1)
-    workers = {int(line.split()[1]) for line in log.read_text().splitlines()}
-    assert len(workers) == 2
+        pids = [int(line.split()[1]) for line in log.read_text().splitlines()] if log.exists() else []
+    workers = set(pids)
     if number == signal.SIGINT:  # as a terminal sends it: to the whole group
         os.killpg(run.pid, number)
     else:

@@ -122,7 +122,12 @@ def control() -> None:
 
 
 def cluster() -> None:
-    """The launcher is found."""
+    """A sweep whose jobs are processes of their own, the launcher for Slurm, and what Dask and Optuna need."""
+    import distributed  # noqa: F401 (found)
+    import optuna  # noqa: F401
+
+    torchvsa("capacity", "--multirun", "experiment=quick", "workers=1", "seed=0,1", "hydra/launcher=submitit_local")
+    assert len(list(Path("outputs").rglob("results.json"))) == 2
     assert "submitit_slurm" in torchvsa("corral", "hydra/launcher=submitit_slurm", "--cfg", "hydra")
 
 
