@@ -46,7 +46,7 @@ def test_a_sweep_goes_on_after_a_job_was_cancelled_and_a_node_drained(
         with pytest.raises(SystemExit) as exit_:
             run_study(study, arguments)
         cancelled, drained = disturbing.result()
-        wait_for(lambda: states(environment) == ["idle", "drained"], 20)
+        wait_for(lambda: states(environment) == ["idle", "drained"], 60)
 
         # All other jobs have finished. None began on the drained node.
         assert exit_.value.code == 1
