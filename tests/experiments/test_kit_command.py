@@ -179,7 +179,10 @@ def test_no_job_of_a_sweep_outlives_a_command_that_is_killed(tmp_path: Path) -> 
     while any(map(running, workers)):
         assert time.monotonic() < deadline, "a job is left"
         time.sleep(0.1)
-    sweep.communicate()
+    sweep.wait()
+    for pipe in (sweep.stdout, sweep.stderr):  # which a process that had not begun a job holds until it ends, too
+        if pipe is not None:
+            pipe.close()
 
 
 def running(pid: int) -> bool:

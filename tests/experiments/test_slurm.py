@@ -34,7 +34,11 @@ def test_a_sweep_goes_on_after_a_job_was_cancelled_and_a_node_drained(
         monkeypatch.setenv("SLURM_CONF", environment["SLURM_CONF"])
 
         def disturb() -> tuple[int, str]:
-            wait_for(lambda: bool(measured(folder)))
+            try:
+                wait_for(lambda: bool(measured(folder)))
+            except AssertionError:
+                slurm(environment, "scancel", "--user", "root")  # or the command would wait for ever
+                raise
             seed = min(measured(folder))
             (array,) = {one.split("_")[0] for one in slurm(environment, "squeue", "--noheader", "--format=%F").split()}
             slurm(environment, "scancel", f"{array}_{seed}")

@@ -4,6 +4,7 @@ import os
 import shutil
 import socket
 import subprocess
+import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -22,7 +23,7 @@ def missing() -> str:
     return "" if os.geteuid() == 0 else "needs to be root, as slurmd does"
 
 
-def configuration(root: Path) -> str:
+def configuration(root: Path, spool: str) -> str:
     """Two nodes with three processors each, whatever there is; nothing listens but on this machine."""
     host = socket.gethostname().split(".")[0]
     controller, *nodes = free_ports(1 + len(NODES))
@@ -35,7 +36,7 @@ def configuration(root: Path) -> str:
         "AuthType=auth/none",
         "CredType=cred/none",
         f"StateSaveLocation={root}/state",
-        f"SlurmdSpoolDir={root}/spool-%n",
+        f"SlurmdSpoolDir={spool}/%n",
         f"SlurmctldPidFile={root}/slurmctld.pid",
         f"SlurmdPidFile={root}/slurmd-%n.pid",
         f"SlurmctldLogFile={root}/slurmctld.log",
@@ -78,7 +79,9 @@ def running_slurm(root: Path) -> Iterator[dict[str, str]]:
     """The environment in which Slurm's commands talk to a Slurm that runs in `root`; it ends with the context."""
     (root / "state").mkdir(parents=True)
     file = root / "slurm.conf"
-    file.write_text(configuration(root))
+    # slurmd's sockets are there, whose names may have 107 characters.
+    spool = tempfile.mkdtemp(prefix="slurm-")
+    file.write_text(configuration(root, spool))
     environment = {**os.environ, "SLURM_CONF": str(file)}
     daemons = [
         subprocess.Popen(
@@ -108,6 +111,7 @@ def running_slurm(root: Path) -> Iterator[dict[str, str]]:
             except subprocess.TimeoutExpired:
                 daemon.kill()
                 daemon.wait()
+        shutil.rmtree(spool, ignore_errors=True)
 
 
 def states(environment: dict[str, str]) -> list[str]:
