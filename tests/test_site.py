@@ -7,18 +7,16 @@ import io
 import json
 import re
 import shlex
-import sys
 import tomllib
 from pathlib import Path
 from types import FunctionType
 
 import pytest
+from check_links import problems
+from docstrings import converted
 from packages import ROOT, install, python
 
 DOCS = ROOT / "docs"
-sys.path.insert(0, str(DOCS))
-from check_links import problems  # noqa: E402 (of the site)
-from docstrings import converted  # noqa: E402
 
 BLOCKS = {page.stem: re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL) for page in DOCS.glob("*.md")}
 ELSEWHERE = {

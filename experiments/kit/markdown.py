@@ -23,7 +23,7 @@ from pathlib import Path
 from urllib.parse import quote
 
 from behaviours.storage import write_atomically
-from experiments.kit.page import Block, Page
+from experiments.kit.page import Block, Page, Table
 
 
 def write_markdown(page: Page, path: Path) -> Path:
@@ -66,11 +66,12 @@ def _parts(block: Block, pictures: str) -> Iterator[str]:
         yield f"![{escaped(block.alt)}]({quote(pictures)}/{quote(_file(block))})"
         yield from [caption] if caption else []
     elif block.kind == "table":
-        yield block.content.markdown()  # type: ignore[attr-defined] (a table)
+        assert isinstance(block.content, Table)
+        yield block.content.markdown()
         yield from [caption] if caption else []
     elif block.kind == "terms":
-        pairs: list[tuple[str, str]] = block.content  # type: ignore[assignment] (of strings)
-        yield "\n".join(f"- {escaped(term)}: {escaped(meaning)}" for term, meaning in pairs)
+        assert isinstance(block.content, list)
+        yield "\n".join(f"- {escaped(term)}: {escaped(meaning)}" for term, meaning in block.content)
     elif block.kind == "code":
         yield from [caption] if caption else []
         text = str(block.content)
