@@ -79,7 +79,10 @@ class Encoder:
     def encode_sensor(self, i: int, reading: float) -> Vector:
         low, high = self.sensor_range[i]
         bins = len(self.sensor_value)
-        return self.sensor_value[min(math.floor((reading - low) * bins / (high - low)), bins - 1)]
+        place = (reading - low) * bins / (high - low)
+        if math.isclose(place, round(place), rel_tol=2.0**-50):  # on an edge, up to rounding
+            place = round(place)
+        return self.sensor_value[min(math.floor(place), bins - 1)]
 
     def encode_actuator(self, i: int, command: float) -> Vector:
         low, high, levels = self.actuator_range[i]

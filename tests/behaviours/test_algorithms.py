@@ -161,3 +161,14 @@ def test_results_of_samples_that_were_not_stored_are_unknown() -> None:
     behaviour = OneShot().fit(made, shown)
     assert behaviour.results.tolist() == [[0, 0], [1, 2]]
     assert behaviour(shown.sensors).commands.tolist() == [[-1.0, -1], [-1, -1], [0, 1]]
+
+
+def test_a_reading_that_equals_an_edge_up_to_rounding_is_above_it() -> None:
+    """0 is the second of the edges -1, 0, 1, 2, 3; the float just below it is not told apart from it."""
+    schema = Schema([Sensor("s", -1, 3)], [Actuator("a", -1, 1, levels=2)])
+    made = Space(schema, Sum(Lookup(torchvsa.MAP(64), bins=4), 1), seed=0)
+    below = [[-4e-15], [-(2.0**-52)], [0.0]]
+    assert made.cells(below).flatten().tolist() == [0, 1, 1]
+    encoder = oracle.Encoder.of(made)
+    for reading in below:
+        np.testing.assert_array_equal(encoder.condition(reading), made.encode(made.cells([reading]))[0].numpy())
