@@ -35,12 +35,11 @@ from experiments.generalisation.combinations import (
 from experiments.generalisation.corral_results import FIGURE, HOME, TEACHER, headline, summarise, tables
 from experiments.kit import Cell, Part, Row, Study, part, parts, setting, settings
 from experiments.models.baselines import CLASSIFIERS, Classified
+from experiments.tasks import in_bullet
 from experiments.tasks.agreement import right
 from experiments.tasks.corral import (
     FIRST_DEMONSTRATION,
-    Driving,
     arenas,
-    check_driving,
     drive,
     drive_together,
     moving,
@@ -49,7 +48,7 @@ from experiments.tasks.corral import (
 
 
 @dataclass
-class Generalisation(Driving):
+class Generalisation(in_bullet.InBullet):
     """The settings of this study."""
 
     vsa: Part = part("vsa", "map_c", "the architecture")
@@ -94,7 +93,7 @@ class Generalisation(Driving):
 
 def check(settings: Generalisation) -> None:
     """Raise for what cannot be run."""
-    check_driving(settings)
+    in_bullet.check(settings)
     counts, draws = settings.demonstrations, settings.draws
     if counts != sorted(counts):
         raise ValueError(f"demonstrations are growing numbers; got {counts}")
@@ -192,7 +191,10 @@ def measure(material: Material, cell: Cell) -> list[Row]:
         row = {"arena": arena, **named, **agreement(controller, space, train, material.heldout[arena])}
         # The default drives everywhere; with one part changed, in unseen arenas after the most demonstrations only.
         if changes == 0 or (changes == 1 and (arena == HOME or count == most)):
-            row |= counts_of(drive(settings, controller, episodes, arena))
+            rollout = drive(settings, controller, episodes, arena)
+            row |= counts_of(rollout)
+            if changes == 0 and count == most and learner not in settings.baselines:
+                row |= in_bullet.counted(in_bullet.effects(settings, controller, rollout, arena))
         rows.append(row)
     return rows
 
@@ -223,7 +225,7 @@ its bins were in no demonstration.
 Learners are named encoder/protection/record/rule. All combinations are compared with the teacher, and those drive that
 differ from the default, which is the first, in one part at most. Success: the robot reaches the lamp and stays. The
 default drives from `starts` starts in each arena, all others from `variant_starts`, which are the first of those, and
-in unseen arenas after the most demonstrations only.
+in unseen arenas after the most demonstrations only. After those the default drives in the physics engine, too.
 """
 
 study = Study(
@@ -248,6 +250,8 @@ study = Study(
             "protections": ["none"],
             "records": ["product"],
             "rules": ["error_driven", "one_shot"],
+            "bullet_starts": 0,
+            "wheeled_starts": 0,
         }
     },
 )

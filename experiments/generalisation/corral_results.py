@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 from experiments.kit import Column, Drawing, Outcome, Row, Table, aggregated, pivot
 from experiments.kit.figures import BLACK, BLUE, by_measure, legend_below, looks, panels
+from experiments.tasks import in_bullet
 from experiments.tasks.corral import success
 
 TEACHER = "teacher"
@@ -27,8 +28,10 @@ def summarise(settings: Any, records: pd.DataFrame) -> list[Row]:
     columns = {name + end: (name, how) for name in ("heldout", "unseen") for end, how in spread.items()}
     columns |= {"draws": ("arena", "count"), "episodes": ("episodes", "sum"), "successes": ("successes", "sum")}
     found = aggregated(records.reindex(columns=[*KEYS, "heldout", "unseen", "episodes", "successes"]), KEYS, columns)
+    groups: Any = records.groupby(KEYS, dropna=False)
     for row in found:
         row |= named.get(row["learner"], {}) | success(row["episodes"], row.pop("successes"))
+        row |= in_bullet.differences(groups.get_group(tuple(row[key] for key in KEYS)))
     return found
 
 
@@ -53,6 +56,7 @@ def tables(outcome: Outcome) -> list[Table]:
         pivot("Agreement, by demonstrations", home, [learner], count, heldout, range_of),
         pivot("Agreement in conditions not demonstrated, by demonstrations", home, [learner], count, unseen, range_of),
         pivot("Success, by demonstrations", driven, [learner, arena], count, rate, rates),
+        *in_bullet.tables([arena], driven, "The default after the most demonstrations, from its first starts."),
     ]
 
 

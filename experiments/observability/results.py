@@ -26,6 +26,7 @@ from experiments.kit.figures import (
 )
 from experiments.models.disturbances import DISTURBANCES
 from experiments.observability.learners import LEARNERS
+from experiments.tasks import in_bullet
 
 LOOKS = {
     "teacher": (BLACK, "o"),
@@ -75,6 +76,9 @@ def tables(outcome: Outcome) -> list[Table]:
         found.append(pivot(title, rows, [Column("learner")], Column("label"), value, about))
     learners = [{"learner": name, "about": LEARNERS[name].about} for name in outcome.settings.learners]
     found.append(Table("Learners", [Column("learner"), Column("about", "what it is")], words=True).show(learners))
+    about = "The first `bullet_starts` and `wheeled_starts` starts of `bullet_learners`."
+    keys = [Column("disturbance"), Column("label", "strength"), Column("learner")]
+    found += in_bullet.tables(keys, table, about)
     chosen = choices(outcome.records)
     return [*found, CHOICES.show(chosen)] if chosen else found
 

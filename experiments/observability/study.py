@@ -24,7 +24,7 @@ from experiments.observability import results
 from experiments.observability.learners import LEARNERS, Task, compare, disturbed_rule
 from experiments.observability.memory import TeacherRuns
 from experiments.observability.windows import WindowPolicy
-from experiments.tasks import corral
+from experiments.tasks import corral, in_bullet
 from torchvsa.encoders.history import check_lags
 
 KEYS = ("disturbance", "strength", "learner")
@@ -54,7 +54,7 @@ class Strengths:
 
 
 @dataclass
-class Observability(corral.InOneArena):
+class Observability(corral.InOneArena, in_bullet.InBullet):
     """The settings of this study. `rule` is that of `default`; the others follow the gradient."""
 
     seconds: float = setting(40.0, "longest duration of an episode, s", low=1 / sim.CONTROL_HZ)
@@ -71,6 +71,10 @@ class Observability(corral.InOneArena):
     heldout: int = setting(40, "held-out ones, on which commands are compared", low=1)
     compare_every: int = setting(4, "compare at every n-th control step: neighbours hardly differ", low=1)
     starts: int = setting(80, "held-out starts per learner, disturbance and strength; 0: none drives", low=0)
+    bullet_learners: list[str] = setting(
+        ["default"], "those of the learners whose robots drive in the physics engine, too", choices=LEARNERS,
+        distinct=True, empty=True,
+    )  # fmt: skip
     # Readings that fail contradict each other, and the gradient weighs the samples against each other. On validation
     # runs 30 epochs raised a balanced agreement by at most .02 over 10.
     epochs: int = setting(10, "epochs of the programs that learn disturbed demonstrations", low=1)
@@ -89,7 +93,7 @@ def check(settings: Observability) -> None:
     for lags in settings.lags:
         check_lags(lags)
     corral.arena(settings.arena)
-    corral.check_driving(settings)
+    in_bullet.check(settings, bool(settings.starts and settings.bullet_learners))
     parts.refuse_unsupported(disturbed_rule(settings), corral.check_learning(settings))
 
 
@@ -151,18 +155,28 @@ def measure(material: Material, cell: Cell) -> list[Row]:
         agreement = compare(learned, disturbance, material.heldout, settings.compare_every)
         row = {"strength": float(disturbance.strength), **memory, **asdict(agreement)}
         policy = WindowPolicy(disturbance, learned.answer, learned.memory)
-        found += [{**row, **episode} for episode in driven(settings, policy)]
+        in_both = cell["learner"] in settings.bullet_learners
+        found += [{**row, **episode} for episode in driven(settings, policy, in_both)]
     return found
 
 
-def driven(settings: Observability, policy: sim.Controller) -> list[Row]:
-    """A row for each episode that the policy drives from the held-out starts; one without values if there are none."""
+def driven(settings: Observability, policy: sim.Controller, in_both: bool) -> list[Row]:
+    """A row for each episode that the policy drives from the held-out starts; one without values if there are none.
+
+    Where it drives `in_both` engines, the row says what the physics engine makes of the start.
+    """
     if not settings.starts:
         return [dict.fromkeys(EPISODE)]
-    rollout = corral.drive(settings, policy, range(settings.starts), corral.arena(settings.arena))
+    arena = corral.arena(settings.arena)
+    rollout = corral.drive(settings, policy, range(settings.starts), arena)
     columns = rollout.episode, rollout.success, rollout.escaped, rollout.time_to_light
     values = zip(*(column.tolist() for column in columns), strict=True)
-    return [dict(zip(EPISODE, one, strict=True)) for one in values]
+    rows: list[Row] = [dict(zip(EPISODE, one, strict=True)) for one in values]
+    if in_both:
+        for body, each in in_bullet.effects(settings, policy, rollout, arena).items():
+            for row, effect in zip(rows, each, strict=False):  # of the first starts
+                row |= in_bullet.counted({body: [effect]})
+    return rows
 
 
 def summarise(settings: Observability, records: pd.DataFrame) -> list[Row]:
@@ -178,7 +192,8 @@ def summarise(settings: Observability, records: pd.DataFrame) -> list[Row]:
             episodes = int(group.episode.count())
             success = corral.success(episodes, group.success.sum())
             escapes = {"escape_rate": group.escaped.sum() / episodes if episodes else None}
-            table.append({**cell, "strength": strength, "label": label, **figures, **success, **escapes})
+            there = in_bullet.differences(group)
+            table.append({**cell, "strength": strength, "label": label, **figures, **success, **escapes, **there})
     return table
 
 

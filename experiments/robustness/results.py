@@ -10,6 +10,7 @@ from matplotlib.ticker import PercentFormatter
 from experiments.kit import Column, Drawing, Outcome, Row, Table, pivot
 from experiments.kit.figures import BLUE, GREEN, ORANGE, PURPLE, VERMILION, by_measure, legend_below, panels
 from experiments.models.damage import DAMAGES, PARAMETERS, PARTS
+from experiments.tasks import in_bullet
 
 LOOKS = {
     "default": (BLUE, "o"),
@@ -79,7 +80,10 @@ def tables(outcome: Outcome) -> list[Table]:
         taken = [row for row in rows if row[value] is not None]
         shown = Column(value, format=lambda row, value=value: f"{100 * row[value]:.1f}")
         found += [pivot(title.capitalize(), taken, keys, Column("share", format="g"), shown, about)] if taken else []
-    return found
+    about = "The first `bullet_starts` and `wheeled_starts` starts of `bullet_learners`."
+    undamaged = {row["learner"]: row | {"part": None, "damage": None} for row in rows if not row["share"]}
+    driven = [*undamaged.values(), *(row for row in rows if row["share"])]
+    return found + in_bullet.tables([*keys, Column("share", format="g")], driven, about)
 
 
 def curves(outcome: Outcome) -> Figure:

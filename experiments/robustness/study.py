@@ -27,7 +27,7 @@ from experiments.models.damage import DAMAGES, PARAMETERS, PARTS, Damage, Learne
 from experiments.robustness import results
 from experiments.robustness.baselines import network, tree
 from experiments.robustness.programs import Program, refuse_undamageable
-from experiments.tasks import corral
+from experiments.tasks import corral, in_bullet
 from experiments.tasks.agreement import share_right
 
 KEYS = ("learner", "part", "damage", "share")
@@ -35,7 +35,7 @@ TEACHER = "teacher"
 
 
 @dataclass
-class Robustness(corral.InOneArena):
+class Robustness(corral.InOneArena, in_bullet.InBullet):
     """The settings of this study; those of `Learning` are the learner `default`."""
 
     one_shot: corral.Printed = settings(
@@ -56,6 +56,10 @@ class Robustness(corral.InOneArena):
     noise: float = setting(3.0, "standard deviation of noise, in root mean squares of the undamaged elements", low=0)
     draws: int = setting(5, "draws of the damaged elements, for each share", low=1)
     drive_shares: list[float] = setting([0.0, 0.1, 0.3], "those of the shares at which robots drive", empty=True)
+    bullet_learners: list[str] = setting(
+        ["default"], "those of the learners whose robots drive in the physics engine, too", choices=lambda: LEARNERS,
+        distinct=True, empty=True,
+    )  # fmt: skip
     starts: int = setting(100, "held-out starts, spread over the draws", low=1)
     demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
     hidden: int = setting(64, "units of the MLP", low=1)
@@ -73,7 +77,7 @@ def check(settings: Robustness) -> None:
     if unknown := [share for share in settings.drive_shares if share not in shares]:
         raise ValueError(f"drive_shares are some of the shares {shares}; got {unknown}")
     corral.arena(settings.arena)
-    corral.check_driving(settings)
+    in_bullet.check(settings, bool(settings.bullet_learners))
     for name, options in (("default", settings), ("one_shot", settings.one_shot)):
         if name in settings.learners:
             space = space_of(settings, options)
@@ -168,8 +172,11 @@ def measure(material: Material, cell: Cell) -> list[Row]:
         found = {"draw": draw, "agreement": share_right(copy, material.heldout), "episodes": 0, "successes": 0}
         starts = range(draw, settings.starts, draws)
         if share in settings.drive_shares and starts:
-            rollout = corral.drive(settings, copy, starts, corral.arena(settings.arena))
+            arena = corral.arena(settings.arena)
+            rollout = corral.drive(settings, copy, starts, arena)
             found |= {"episodes": len(rollout), "successes": int(rollout.success.sum())}
+            if cell["learner"] in settings.bullet_learners:
+                found |= in_bullet.counted(in_bullet.effects(settings, copy, rollout, arena))
         for case in those:
             size = learner.elements(case["part"])
             rows.append({**case, "elements": size, "damaged": damage.count(size), **found})
@@ -188,8 +195,10 @@ def summarise(settings: Robustness, records: pd.DataFrame) -> list[Row]:
         "agreement_max": ("agreement", "max"),
     }
     found = aggregated(records.loc[records.learner != TEACHER], KEYS, columns, cases(settings))
+    groups: Any = records.groupby(list(KEYS), dropna=False)
     for row in found:
         row |= corral.success(row["episodes"], row.pop("successes"))
+        row |= in_bullet.differences(groups.get_group(tuple(row[key] for key in KEYS)))
     return table + found
 
 
@@ -215,5 +224,7 @@ study = Study(
     figures=[results.FIGURE],
     headline=results.headline,
     method=results.METHOD,
-    presets={"quick": {"draws": 1, "starts": 20, "shares": [0.0, 0.2, 0.4], "drive_shares": [0.0]}},
+    presets={
+        "quick": {"draws": 1, "starts": 20, "bullet_learners": [], "shares": [0.0, 0.2, 0.4], "drive_shares": [0.0]}
+    },
 )

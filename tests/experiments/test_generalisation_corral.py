@@ -32,6 +32,8 @@ TINY = (
     "starts=4",
     "variant_starts=2",
     "seconds=3",
+    "bullet_starts=0",
+    "wheeled_starts=0",
     "workers=1",
 )
 DEFAULT = "level/none/product/error_driven"

@@ -29,6 +29,7 @@ SMALL = (
     "demonstrations=8", "validation=4", "heldout=4", "starts=4", "seconds=4", "vsa.dim=300", "encoder.bins=8",
     "encoder.span=2", "epochs=2", "lags=[[1],[1,2]]", "leaves=[5]", "strengths.missing=[0,0.5]",
     "strengths.aliased=[0,1]", "disturbances=[missing,aliased]", "learners=[teacher,default,trace,hold,tree_memory]",
+    "bullet_learners=[]",
 )  # fmt: skip
 
 

@@ -98,6 +98,7 @@ TINY = (
     "parts=[program]",
     "learners=[default,decision_tree]",
     "workers=1",
+    "bullet_learners=[]",
 )
 
 
