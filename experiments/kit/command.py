@@ -28,9 +28,10 @@ from experiments.kit import run as runs
 from experiments.kit.console import wide_console
 from experiments.kit.messages import in_words, of_cluster
 from experiments.kit.options import refuse_no_names, register_groups
+from experiments.kit.pool import jobs_end_with_this_process
 from experiments.kit.safety import refuse_code
 from experiments.kit.settings import NO_MATTER
-from experiments.kit.signals import end_without, ended_by_signals
+from experiments.kit.signals import ended_by_signals
 from experiments.kit.study import Outcome, Study
 
 TRACEBACK_WANTED = os.environ.get("HYDRA_FULL_ERROR") == "1"
@@ -70,7 +71,7 @@ def run_study(study: Study, arguments: Sequence[str] | None = None) -> None:
 
         print_help(study, Console())
         return
-    with errors_in_one_line(study.name), ended_by_signals(), _jobs_waited_for():
+    with errors_in_one_line(study.name), ended_by_signals(), jobs_end_with_this_process(), _jobs_waited_for():
         refuse_code(given)
         refuse_unknown_flags(given)
         refuse_no_names(given)
@@ -112,13 +113,10 @@ class _Job:
 
     def __init__(self, study: Study) -> None:
         self.study = study
-        self.command = os.getpid()
         self.__name__ = study.name
 
     def __call__(self, cfg: DictConfig) -> float | None:
         study = self.study
-        if os.getppid() == self.command:  # in a process of joblib's, which a command that is killed leaves behind
-            end_without(self.command)
         console = wide_console()
         # A sweep goes on after a job that failed, and Hydra then says which one it was.
         alone = HydraConfig.get().mode == RunMode.RUN

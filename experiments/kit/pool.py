@@ -6,22 +6,22 @@ import hashlib
 import os
 import pickle
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import cloudpickle
 import joblib
 import numpy as np
 import torch
+from hydra_plugins.hydra_joblib_launcher import _core
 from joblib.executor import get_memmapping_executor
 from joblib.parallel import get_active_backend
 from numpy.typing import NDArray
 
-from experiments.kit.signals import without_interrupts
+from experiments.kit.signals import end_without, without_interrupts
 
 Measure = Callable[[Any, Any], Any]
 
@@ -155,10 +155,15 @@ def processes(workers: int) -> Iterator[Executor | None]:
 def _begin(parent: int) -> None:
     """What a worker does first: use one thread, and watch its parent, which cannot end it if it is killed itself."""
     torch.set_num_threads(1)
+    end_without(parent)
 
-    def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(0.5)
-        os._exit(1)
 
-    threading.Thread(target=watch, daemon=True).start()
+@contextmanager
+def jobs_end_with_this_process() -> Iterator[None]:
+    """Within this context, so do the processes of Hydra's launcher for joblib, also those that have begun no job."""
+    before = _core.Parallel
+    _core.Parallel = partial(before, initializer=end_without, initargs=(os.getpid(),))
+    try:
+        yield
+    finally:
+        _core.Parallel = before

@@ -7,9 +7,10 @@ import select
 import signal
 import sys
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, partial
 from multiprocessing import resource_tracker
 
 
@@ -31,19 +32,24 @@ def ended_by_signals() -> Iterator[None]:
 
 @cache
 def end_without(process: int) -> None:
-    """End this process as soon as another one has ended, which need not be its parent. On Linux only."""
-    if sys.platform != "linux":
-        return
+    """End this process as soon as another one has ended: any on Linux, elsewhere its parent."""
     try:
-        watched = os.pidfd_open(process)
+        wait = partial(select.select, [os.pidfd_open(process)], [], [])
     except ProcessLookupError:
         os._exit(1)
+    except AttributeError:  # there are none
+        wait = partial(_wait_for_parent, process)
 
     def watch() -> None:
-        select.select([watched], [], [])
+        wait()
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
+
+
+def _wait_for_parent(process: int) -> None:
+    while os.getppid() == process:
+        time.sleep(0.5)
 
 
 @contextmanager
