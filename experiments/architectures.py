@@ -55,8 +55,8 @@ class Architectures(corral.Driving):
     bins: int = setting(32, "bins of each sensor; level codes span a quarter of them", low=4, high=1_000_000)
     protection: Part = part("protection", "none", "what is done to a condition before it is bound")
     rule: Part = part("rule", "error_driven", "how a program is learned")
-    demonstrations: int = setting(20, "episodes of the teacher to learn from", low=1)
-    starts: int = setting(200, "held-out starts", low=1)
+    demonstrations: int = corral.episodes(20, "episodes of the teacher to learn from")
+    starts: int = corral.episodes(200, "held-out starts")
     repeats: int = setting(2, "draws of the codebooks", low=1)
 
 

@@ -37,8 +37,8 @@ class Engines(corral.Learning):
         ["teacher", "default", "bundled"], "what drives; the learned ones in arenas with one light only",
         choices=["teacher", "default", "bundled"], distinct=True,
     )  # fmt: skip
-    starts: int = setting(1000, "common starts", low=2)
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    starts: int = corral.episodes(1000, "common starts", low=2)
+    demonstrations: int = corral.episodes(60, "episodes of the teacher to learn from")
 
 
 def check(settings: Engines) -> None:

@@ -17,6 +17,7 @@ import pandas as pd
 from experiments.composition import algebra_figures, algebra_tables, operations
 from experiments.composition.operations import EIGHT, RULES, Asked
 from experiments.kit import Cell, Drawing, Row, Settings, Study, grid, setting, settings
+from experiments.tasks.corral import episodes
 
 OPERATIONS = ("removal", "mirror", "distance", "recognition", "interpolation")
 READINGS, SHOWN = ("uniform", "driven"), ("same", "own")
@@ -43,7 +44,7 @@ class Algebra(Settings):
     dim: int = setting(4000, "elements of a hypervector; even, since a mirror image is a rotation by half", low=2)
     bins: int = setting(32, "bins per sensor", low=2)
     margin: float = setting(0.5, "lead that counts as correct in error-driven learning, in stored pairs", low=0)
-    demonstrations: int = setting(20, "runs of the teacher to learn from", low=1)
+    demonstrations: int = episodes(20, "runs of the teacher to learn from")
     tested: int = setting(200, "held-out runs of the teacher, or of each behaviour to recognise", low=1)
     readings: list[str] = setting(
         list(READINGS), "distance: spread over the sensors' ranges, or from runs", choices=READINGS, distinct=True
@@ -58,7 +59,7 @@ class Algebra(Settings):
     behaviours: list[str] = setting(list(EIGHT), "recognition: behaviours to tell apart", choices=EIGHT, distinct=True)
     steps: list[int] = setting([1, 5, 20, 100], "recognition: steps that are seen", low=1, distinct=True)
     sequences: int = setting(4000, "recognition: sequences of steps, of all behaviours together", low=1)
-    recognition_demonstrations: int = setting(100, "recognition: runs of each behaviour to learn from", low=1)
+    recognition_demonstrations: int = episodes(100, "recognition: runs of each behaviour to learn from")
 
 
 def check(settings: Algebra) -> None:

@@ -54,8 +54,8 @@ class Damaged(Combining):
         [0.02, 0.05, 0.1], "standard deviations of the sensors' noise, as shares of their ranges",
         low=0, distinct=True, empty=True,
     )  # fmt: skip
-    starts: int = setting(200, "held-out starts, over all codebooks", low=1)
-    heldout: int = setting(100, "episodes of the teacher about which programs are asked", low=1)
+    starts: int = corral.episodes(200, "held-out starts, over all codebooks")
+    heldout: int = corral.episodes(100, "episodes of the teacher about which programs are asked")
     kept: float = setting(0.95, "a level is survived if this share of the undamaged agreement is left", above=0, high=1)
 
 

@@ -54,7 +54,7 @@ class Interference(Apart):
         choices=sums.SOURCES, distinct=True,
     )  # fmt: skip
     draws: int = setting(3, "draws of the joint samples, for each draw of the codebooks", low=1)
-    heldout: int = setting(200, "episodes of the teacher about which programs are asked", low=1)
+    heldout: int = corral.episodes(200, "episodes of the teacher about which programs are asked")
 
 
 def check(settings: Interference) -> None:

@@ -40,11 +40,11 @@ class Sequence(Settings):
     arenas: list[str] = setting(
         ["lamp_room", "two_lamps"], "where they learn and drive", choices=sim.ARENAS, distinct=True
     )
-    starts: int = setting(500, "held-out starts, divided among the codebooks", low=1)
-    bullet_starts: int = setting(200, "the first of them that are driven in the physics engine, too", low=0)
+    starts: int = corral.episodes(500, "held-out starts, divided among the codebooks")
+    bullet_starts: int = corral.episodes(200, "the first of them that are driven in the physics engine, too", low=0)
     codebooks: int = setting(10, "draws of codebooks and contexts", low=1, high=MOST_CODEBOOKS)
-    demonstrations: int = setting(20, "runs of the teacher to the blue lamp to learn from", low=1)
-    heldout: int = setting(200, "runs of the teacher to the yellow lamp about which 'to yellow' is asked", low=1)
+    demonstrations: int = corral.episodes(20, "runs of the teacher to the blue lamp to learn from")
+    heldout: int = corral.episodes(200, "runs of the teacher to the yellow lamp about which 'to yellow' is asked")
     seconds: float = setting(120.0, "longest duration of an episode, s; of a run to one lamp, half of it", above=0)
     dim: int = setting(4000, "elements of the hypervector; even, since a mirror image is a rotation by half", low=2)
     bins: int = setting(32, "bins per sensor", low=2)

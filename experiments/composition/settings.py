@@ -24,7 +24,7 @@ class Apart(corral.Learning):
         list(sim.BEHAVIOURS), "what is learned apart; where several fire, the first of these is shown",
         choices=lambda: BEHAVIOURS, distinct=True,
     )  # fmt: skip
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    demonstrations: int = corral.episodes(60, "episodes of the teacher to learn from")
     codebooks: int = setting(10, "draws of the codebooks; a start e is driven with codebook e mod this number", low=1)
 
 
@@ -49,10 +49,10 @@ class Composition(Combining):
         "rows that drive in the physics engine, too", choices=rows_known, distinct=True, empty=True,
     )  # fmt: skip
     arenas: list[str] = setting(ARENAS, "where they drive; all learn in `default`", choices=sim.ARENAS, distinct=True)
-    starts: int = setting(1000, "held-out starts in default and large, over all codebooks", low=1)
-    other_starts: int = setting(500, "held-out starts in every other arena", low=1)
-    bullet_starts: int = setting(200, "held-out starts in the physics engine", low=1)
-    heldout: int = setting(200, "episodes of the teacher in each arena about which programs are asked", low=1)
+    starts: int = corral.episodes(1000, "held-out starts in default and large, over all codebooks")
+    other_starts: int = corral.episodes(500, "held-out starts in every other arena")
+    bullet_starts: int = corral.episodes(200, "held-out starts in the physics engine")
+    heldout: int = corral.episodes(200, "episodes of the teacher in each arena about which programs are asked")
 
 
 def check(settings: Composition) -> None:

@@ -20,17 +20,17 @@ class Corral(corral.InOneArena):
     controllers: list[str] = setting(
         DEFAULT_ROWS, "the rows of the table, in this order", choices=lambda: CONTROLLERS, distinct=True
     )
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    demonstrations: int = corral.episodes(60, "episodes of the teacher to learn from")
     demonstrations_file: str | None = setting(
         None, "or a file of your own to learn from, as written by behaviours.Demonstrations.save"
     )
-    starts: int = setting(1000, "held-out starts for teacher, default and bundled", low=1)
-    wheeled_starts: int = setting(200, "held-out starts for the rows on the wheeled body", low=1)
-    other_starts: int = setting(200, "held-out starts for every other controller", low=1)
+    starts: int = corral.episodes(1000, "held-out starts for teacher, default and bundled")
+    wheeled_starts: int = corral.episodes(200, "held-out starts for the rows on the wheeled body")
+    other_starts: int = corral.episodes(200, "held-out starts for every other controller")
     paper_bins: list[int] = setting(
         [2, 3, 4, 6, 8, 12, 16], "tried for paper_best_bins, and the bins of paper", low=1, distinct=True, empty=True
     )
-    validation_starts: int = setting(40, "starts to choose among them, not among the held-out ones", low=1)
+    validation_starts: int = corral.episodes(40, "starts to choose among them, not among the held-out ones")
     ppo_steps: int = setting(1_000_000, "control steps of all robots together for which ppo is trained", low=1)
     animate: bool = setting(True, "draw one episode of teacher and learned robot side by side, as an animation")
 

@@ -42,6 +42,7 @@ from experiments.tasks.corral import (
     arenas,
     drive,
     drive_together,
+    episodes,
     moving,
     shown_in,
 )
@@ -52,8 +53,8 @@ class Generalisation(in_bullet.InBullet):
     """The settings of this study."""
 
     vsa: Part = part("vsa", "map_c", "the architecture")
-    demonstrations: list[int] = setting(
-        [1, 2, 5, 10, 50], "episodes of the teacher, growing; larger ones contain the smaller", low=1, distinct=True
+    demonstrations: list[int] = episodes(
+        [1, 2, 5, 10, 50], "episodes of the teacher, growing; larger ones contain the smaller", distinct=True
     )
     draws: list[int] = setting([3, 3, 2, 1, 1], "how many times each of them is drawn anew", low=1)
     encoders: list[str] = setting(
@@ -81,10 +82,8 @@ class Generalisation(in_bullet.InBullet):
         ["default", "narrow", "offset_lamp", "large"], "`default` first, then unseen ones", choices=arenas,
         distinct=True,
     )  # fmt: skip
-    starts: int = setting(
-        48, "held-out starts in each arena for the teacher and the default, shared by the draws", low=1
-    )
-    variant_starts: int = setting(18, "starts for the baselines and the combinations with one part changed", low=1)
+    starts: int = episodes(48, "held-out starts in each arena for the teacher and the default, shared by the draws")
+    variant_starts: int = episodes(18, "starts for the baselines and the combinations with one part changed")
 
     def combinations(self) -> list[Combination]:
         """All of them, the default first."""

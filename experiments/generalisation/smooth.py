@@ -28,6 +28,7 @@ from experiments.tasks.corral import (
     drive,
     drive_together,
     driven,
+    episodes,
     moving,
     success,
 )
@@ -51,8 +52,8 @@ class Smooth(Driving):
         [250, 1000, 4000], "dimensions of the program; the largest also for levels and driving", low=1, distinct=True
     )
     levels: list[int] = setting([3, 5, 9, 21], "discrete levels per wheel", low=2, distinct=True)
-    demonstrations: int = setting(20, "episodes of the corral's teacher to learn from", low=1)
-    starts: int = setting(48, "held-out starts in the corral", low=1)
+    demonstrations: int = episodes(20, "episodes of the corral's teacher to learn from")
+    starts: int = episodes(48, "held-out starts in the corral")
     blocks: int = setting(3, "blocks of the real data that are held back in turn", low=1, high=FOLDS)
 
 

@@ -66,11 +66,11 @@ class Observability(corral.InOneArena, in_bullet.InBullet):
         list(DISTURBANCES), "what comes between sensors and program", choices=DISTURBANCES, distinct=True
     )
     strengths: Strengths = settings(Strengths, "strengths of each disturbance, rising from 0, which is undisturbed")
-    demonstrations: int = setting(80, "episodes of the teacher to learn from", low=1)
-    validation: int = setting(40, "other ones, on which learners choose their memory", low=1)
-    heldout: int = setting(40, "held-out ones, on which commands are compared", low=1)
+    demonstrations: int = corral.episodes(80, "episodes of the teacher to learn from")
+    validation: int = corral.episodes(40, "other ones, on which learners choose their memory")
+    heldout: int = corral.episodes(40, "held-out ones, on which commands are compared")
     compare_every: int = setting(4, "compare at every n-th control step: neighbours hardly differ", low=1)
-    starts: int = setting(80, "held-out starts per learner, disturbance and strength; 0: none drives", low=0)
+    starts: int = corral.episodes(80, "held-out starts per learner, disturbance and strength; 0: none drives", low=0)
     bullet_learners: list[str] = setting(
         ["default"], "those of the learners whose robots drive in the physics engine, too", choices=LEARNERS,
         distinct=True, empty=True,

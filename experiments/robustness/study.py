@@ -60,8 +60,8 @@ class Robustness(corral.InOneArena, in_bullet.InBullet):
         ["default"], "those of the learners whose robots drive in the physics engine, too", choices=lambda: LEARNERS,
         distinct=True, empty=True,
     )  # fmt: skip
-    starts: int = setting(100, "held-out starts, spread over the draws", low=1)
-    demonstrations: int = setting(60, "episodes of the teacher to learn from", low=1)
+    starts: int = corral.episodes(100, "held-out starts, spread over the draws")
+    demonstrations: int = corral.episodes(60, "episodes of the teacher to learn from")
     hidden: int = setting(64, "units of the MLP", low=1)
     mlp_epochs: int = setting(60, "at most, over the demonstrations", low=1)
     kept: float = setting(

@@ -30,6 +30,12 @@ FIRST_DEMONSTRATION = 1_000_000
 FIRST_VALIDATION = 2_000_000
 """Held-out starts are the episodes 0, 1, ...; those to learn from and to choose settings with lie far away."""
 
+
+def episodes(default: Any, about: str, low: int = 1, **options: Any) -> Any:
+    """A setting with a number of episodes of one kind, which are not as many as to be of the next kind, too."""
+    return setting(default, about, low=low, high=FIRST_DEMONSTRATION, **options)
+
+
 GROUPS["arena"] = Group(
     sim.ARENAS,
     given=frozenset({"within"}),

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 
 import sim
-from experiments.kit import Column, Row, Table, setting
+from experiments.kit import Column, Row, Table
 from experiments.kit.intervals import mean
 from experiments.tasks import corral
 
@@ -23,10 +23,10 @@ EFFECTS = {"same": 0, "gained": 1, "lost": -1}
 class InBullet(corral.Driving):
     """From how many starts they do."""
 
-    bullet_starts: int = setting(
+    bullet_starts: int = corral.episodes(
         100, "the first starts, driven in the physics engine, too, where the study says so; 0: none", low=0
     )
-    wheeled_starts: int = setting(50, "the same on the wheeled body", low=0)
+    wheeled_starts: int = corral.episodes(50, "the same on the wheeled body", low=0)
 
 
 def check(settings: InBullet, any_drive: bool = True) -> None:

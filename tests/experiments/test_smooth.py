@@ -107,7 +107,7 @@ def test_the_real_robots_raw_distances_predict_the_wall_teachers_commands() -> N
         ("models=[nobody]", "models: there is no 'nobody'"),
         ("levels=[1]", r"levels=\[1\]: expected 2 or more"),
         ("dims=[]", "dims is empty"),
-        ("starts=0", "starts=0: expected 1 or more"),
+        ("starts=0", "starts=0: expected a number from 1 to 1000000"),
         ("blocks=6", "blocks=6: expected a number from 1 to 5"),
     ],
 )
