@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any
 
@@ -24,6 +24,8 @@ Job = submitit.Job[Any]
 
 QUEUE_S = 10.0
 """How often Slurm's queue is read. A job that is in it at neither of two readings, and left no result, is dead."""
+USUAL = {"", "None", "Resources", "Priority", "JobArrayTaskLimit"}
+"""Why jobs wait that will run without anybody doing something."""
 
 
 @contextmanager
@@ -92,25 +94,38 @@ def _wait_here(jobs: Sequence[Job]) -> None:
 
 
 def _wait_for_queue(jobs: Sequence[Job]) -> None:
-    waiting, absent, read = list(jobs), set[str](), time.monotonic()
+    waiting, absent, told, read = list(jobs), set[str](), set[str](), time.monotonic()
     while waiting := [job for job in waiting if not _has_result(job)]:
         if time.monotonic() - read > QUEUE_S:
             queue, read = _queue(), time.monotonic()
             if queue is not None:
-                gone = {job.job_id for job in waiting} - queue
+                names = {job.job_id for job in waiting}
+                gone = names - queue.keys()
                 waiting = [job for job in waiting if job.job_id not in gone & absent]
                 absent = gone
+                told |= _told({name: queue[name] for name in names - gone}, told)
         time.sleep(0.5)
 
 
-def _queue() -> set[str] | None:
-    """The jobs in Slurm's queue, `array_task`; None if Slurm does not answer."""
-    command = ["squeue", "--me", "--noheader", "--array", "--format=%i"]
+def _told(reasons: Mapping[str, str], before: set[str]) -> set[str]:
+    """Say for which reasons jobs wait, other than that others come first and but for those told `before`."""
+    new = set(reasons.values()) - USUAL - before
+    for reason in sorted(new):
+        names = ", ".join(sorted(name for name, why in reasons.items() if why == reason))
+        print(f"{names} in Slurm's queue: {reason}; scancel ends jobs that cannot start", file=sys.stderr)
+    return new
+
+
+def _queue() -> dict[str, str] | None:
+    """The jobs in Slurm's queue, `array_task`, and why they do not run; None if Slurm does not answer."""
+    command = ["squeue", "--me", "--noheader", "--array", "--format=%i %r"]
     try:
         found = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
     except (OSError, subprocess.SubprocessError):
         return None
-    return {line.strip() for line in found.stdout.splitlines()}
+    return {
+        name: reason.strip() for name, _, reason in (line.strip().partition(" ") for line in found.stdout.splitlines())
+    }
 
 
 def _has_result(job: Job) -> bool:

@@ -2,6 +2,7 @@
 
 import re
 import sys
+import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -80,18 +81,36 @@ def test_a_sweep_goes_on_after_a_job_was_cancelled_and_a_node_drained(
 
 
 @pytest.mark.slow
-def test_what_slurm_refuses_is_told_in_one_line(
+def test_what_slurm_refuses_or_holds_is_told_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr("experiments.kit.submitit_jobs.QUEUE_S", 1.0)
+    importable(monkeypatch)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", ["torchvsa"])
     monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
-    with running_slurm(tmp_path / "slurm") as environment:
+    arguments = ["--multirun", "hydra/launcher=submitit_slurm", "seed=0,1", "names=[a]", "repeats=1", "workers=1"]
+    with running_slurm(tmp_path / "slurm") as environment, ThreadPoolExecutor() as threads:
         monkeypatch.setenv("SLURM_CONF", environment["SLURM_CONF"])
         with pytest.raises(SystemExit) as exit_:
-            run_study(
-                study, ["--multirun", "hydra/launcher=submitit_slurm", "hydra.launcher.partition=none", "seed=0,1"]
-            )
-    assert exit_.value.code == 1
-    (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("counting: ")]
-    assert "invalid partition specified: none" in line
+            run_study(study, [*arguments, "hydra.launcher.partition=none"])
+        assert exit_.value.code == 1
+        (line,) = [line for line in capsys.readouterr().err.splitlines() if line.startswith("counting: ")]
+        assert "invalid partition specified: none" in line
+
+        def release() -> None:
+            try:
+                wait_for(lambda: "JobHeldUser" in slurm(environment, "squeue", "--noheader", "--format=%r"))
+            except AssertionError:
+                slurm(environment, "scancel", "--user", "root")  # or the command would wait for ever
+                raise
+            time.sleep(4)  # in which the command reads the queue more than once
+            (array,) = set(slurm(environment, "squeue", "--noheader", "--format=%F").split())
+            slurm(environment, "scontrol", "release", array)
+
+        releasing = threads.submit(release)
+        run_study(study, [*arguments, "+hydra.launcher.additional_parameters.hold=true"])
+        releasing.result()
+    (line,) = [line for line in capsys.readouterr().err.splitlines() if "JobHeldUser" in line]
+    assert re.match(r"\d+_0, \d+_1 in Slurm's queue: JobHeldUser; ", line)
+    assert measured(tmp_path / "outputs" / "counting" / "sweep") == {0: 1, 1: 1}

@@ -1,4 +1,4 @@
-"""The code of the page on sweeps runs: a Dask cluster, and a search with Optuna that goes on."""
+"""The code of the pages on launchers runs: a Dask cluster, and a search with Optuna that goes on."""
 
 import re
 from pathlib import Path
@@ -9,17 +9,15 @@ from test_docs import TINY
 
 pytest.importorskip("optuna", reason="needs the extra cluster")
 
-BLOCKS = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "sweeps.md").read_text(), re.DOTALL)
 
-
-def block(word: str) -> str:
-    (found,) = [block for block in BLOCKS if word in block]
+def code_of(page: str) -> str:
+    (found,) = re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "launchers" / f"{page}.md").read_text(), re.DOTALL)
     return found
 
 
 @pytest.mark.slow
 def test_cells_on_a_dask_cluster(tmp_path: Path) -> None:
-    ran = python(None, block("LocalCluster"), cwd=tmp_path)
+    ran = python(None, code_of("dask"), cwd=tmp_path)
     assert ran.returncode == 0, ran.stderr
     assert ".accuracy" in ran.stdout
     assert list(tmp_path.rglob("results.json"))
@@ -27,7 +25,7 @@ def test_cells_on_a_dask_cluster(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_a_search_with_optuna_goes_on(tmp_path: Path) -> None:
-    code = block("optuna")
+    code = code_of("optuna")
     assert len([line for line in code.splitlines() if line]) <= 20
     tiny = "".join(f', "{setting}"' for setting in TINY)
     code = code.replace('"controllers=[teacher,default]"', f'"controllers=[teacher,default]"{tiny}')
