@@ -18,6 +18,8 @@ WHEEL_RADIUS = 0.04
 """Radius of the wheels of the wheeled body, m."""
 HEIGHT = 0.06
 """Height of the body's centre above the floor, m."""
+FAR = 100.0
+"""A height at which nothing is touched, m."""
 
 WALL_GROUP, WALL_MASK = 1, 3
 """Obstacles, lamps and floor collide with everything. With other values `rayTestBatch` with a mask misses them."""
@@ -195,6 +197,9 @@ BODIES: dict[str, type[PlanarBody] | type[WheeledBody]] = {"planar": PlanarBody,
 
 def _place(body: int, start: Start, client: int) -> tuple[Pose, float]:
     upright = [0.0, 0.0, math.sin(start.heading / 2), math.cos(start.heading / 2)]
+    # A contact outlives a jump to the other side of what was touched, and pushes the robot; one to above it ends it.
+    pybullet.resetBasePositionAndOrientation(body, [start.x, start.y, FAR], upright, client)
+    pybullet.performCollisionDetection(client)
     pybullet.resetBasePositionAndOrientation(body, [start.x, start.y, HEIGHT], upright, client)
     pybullet.resetBaseVelocity(body, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), client)
     return _pose(body, client)

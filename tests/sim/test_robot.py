@@ -143,3 +143,26 @@ def test_unknown_bodies_and_engines_are_named() -> None:
         find_engine("vector").find_body("wheeled")
     with pytest.raises(ValueError, match=r"unknown engine 'steam'.*'bullet', 'vector'"):
         find_engine("steam")
+
+
+@pytest.mark.parametrize(
+    ("towards", "start"),
+    [
+        (0.8634414776475721, Start(1.2902281012846517, -0.4235403289505195, -0.7081469337904926)),
+        (2.6447351615570636, Start(0.4008430514954504, -0.5801602647117043, -1.1122976494527181)),
+    ],
+)
+def test_a_contact_ends_when_the_robot_is_placed_elsewhere(towards: float, start: Start) -> None:
+    arena = sim.find_arena("lamp_room")
+    lamp = arena.lamps[1]
+
+    def first_step(world: World) -> tuple[float, ...]:
+        world.body.place(start)
+        return world.body.drive(0.3, 0.3)
+
+    with World(arena, "planar") as used, World(arena, "planar") as new:
+        used.body.place(Start(lamp.x - 0.6 * math.cos(towards), lamp.y - 0.6 * math.sin(towards), towards))
+        for _ in range(30):
+            used.body.drive(MAX_SPEED, MAX_SPEED)
+        # The robot touches the lamp, and its next start is beyond it.
+        assert first_step(used) == first_step(new)
