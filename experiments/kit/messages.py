@@ -76,4 +76,6 @@ def _of_omegaconf(error: OmegaConfBaseException) -> str:
         if "is not Optional" in text:
             return f"{key}=null: expected a value"
     text = text.partition(" full_key:")[0]
+    if re.match(r"Cannot (assign \w+ to Dict|merge DictConfig with)", text):
+        return f"{key}: it holds settings; write {key}.setting=value"
     return text if not key or key in text else f"{key}: {text}"

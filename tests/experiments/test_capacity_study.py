@@ -197,3 +197,13 @@ def test_a_wrong_setting_is_told_in_one_line(
     assert error.startswith("capacity: rows: there is no 'nobody'; choose from literal, ")
     assert error.count("\n") == 1
     assert not list(tmp_path.rglob("results.json"))
+
+
+@pytest.mark.parametrize("value", ["1e30", "text", "[1,1]"])
+def test_settings_that_hold_settings_take_no_value(
+    value: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HYDRA_FULL_ERROR", "0")
+    with pytest.raises(SystemExit):
+        main(["capacity", f"learners={value}"])
+    assert "learners: it holds settings; write learners.setting=value" in capsys.readouterr().err
