@@ -53,10 +53,15 @@ class Baseline:
 
 
 def network(train: Demonstrations, seed: int, hidden: int, epochs: int) -> Baseline:
-    """An MLP with one hidden layer on standardised readings; its parameters are all weights and biases."""
+    """An MLP with one hidden layer on standardised readings; its parameters are all weights and biases.
+
+    Raises `ValueError` if all demonstrations have the same command.
+    """
     readings = train.sensors.numpy()
     mean, spread = readings.mean(0), readings.std(0).clip(1e-9)
     commands, labels = np.unique(train.commands.numpy(), axis=0, return_inverse=True)
+    if len(commands) < 2:
+        raise ValueError("learners: mlp needs demonstrations with two commands or more; show more, or for longer")
     model = MLPClassifier((hidden,), random_state=seed, max_iter=epochs)
     # One unit for every class, also where two would share one.
     fit_seconds(model, (readings - mean) / spread, np.eye(len(commands))[labels.ravel()])

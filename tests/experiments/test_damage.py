@@ -11,7 +11,7 @@ from kits import composed
 import sim
 from behaviours import Demonstrations
 from experiments.models.damage import DAMAGES, PARTS, Array, Damage, Learner
-from experiments.robustness.baselines import Baseline
+from experiments.robustness.baselines import Baseline, network
 from experiments.robustness.programs import Program
 from experiments.robustness.study import LEARNERS, Robustness, study
 
@@ -173,3 +173,9 @@ def test_the_elements_of_a_tree_are_its_thresholds_and_its_leaves() -> None:
     decisions = [np.array(tree.value[leaves, 0]).argmax(-1) for tree in (flipped, whole)]
     assert (decisions[0] != decisions[1]).all()
     assert (np.array(whole.value[:, 0]) >= 0).all()
+
+
+def test_an_mlp_needs_two_commands() -> None:
+    shown = Demonstrations([[0.1, 0.2, 1.0], [0.3, 0.2, 1.0]], [[1.0, 1.0], [1.0, 1.0]])
+    with pytest.raises(ValueError, match="mlp needs demonstrations with two commands or more"):
+        network(shown, seed=0, hidden=4, epochs=2)
