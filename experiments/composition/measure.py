@@ -22,6 +22,7 @@ from experiments.kit.store import write_frame
 from experiments.tasks import agreement as agreeing
 from experiments.tasks import corral
 from experiments.tasks.asked_once import AskedOnce, EachAskedOnce
+from experiments.tasks.in_bullet import TWINS
 from experiments.tasks.recorded import frame_of
 from sim.statistics import wilson
 
@@ -118,7 +119,9 @@ def measure(material: Material, cell: Cell) -> list[Row]:
     asked = made if together is None else [together.alone(codebook) for codebook in draws]
     # The moments first: robots meet most of their conditions again, and many are asked faster at once.
     agreed = {name: [agreement(one, material.moments[name]) for one in asked] for name in settings.arenas}
-    driving = settings if cell["engine"] == "vector" else replace(settings, engine="bullet", robots=None)
+    driving = settings
+    if body := TWINS.get(cell["engine"]):
+        driving = replace(settings, engine="bullet", body=body, robots=None)
     found = []
     for name in settings.arenas:
         keep = name == PATHS_IN and cell["engine"] == "vector"
@@ -129,6 +132,7 @@ def measure(material: Material, cell: Cell) -> list[Row]:
         for codebook in draws:
             run = runs[codebook % len(runs)]
             own = run.episode % len(draws) == codebook
+            again = {engine: own & (run.episode < twin_starts(settings, engine)) for engine in TWINS}
             found.append(
                 {
                     "arena": name,
@@ -137,6 +141,7 @@ def measure(material: Material, cell: Cell) -> list[Row]:
                     "successes": int(run.success[own].sum()),
                     "collisions": float(run.collisions[own].mean()) if own.any() else None,
                     **agreed[name][codebook],
+                    **{f"{engine}_successes": int(run.success[chosen].sum()) for engine, chosen in again.items()},
                 }
             )
     return found
@@ -151,9 +156,13 @@ def drive_each(settings: Composition, made: list[Any], starts: int, arena: str, 
 
 def starts(settings: Composition, cell: Cell, arena: str) -> int:
     """How many held-out starts a cell drives in an arena."""
-    if cell["engine"] == "bullet":
-        return settings.bullet_starts
-    return settings.starts if arena in FULL else settings.other_starts
+    full = settings.starts if arena in FULL else settings.other_starts
+    return min(full, twin_starts(settings, cell["engine"])) if cell["engine"] in TWINS else full
+
+
+def twin_starts(settings: Composition, engine: str) -> int:
+    """How many of the first starts a row drives again in the physics engine."""
+    return settings.wheeled_starts if engine == "wheeled" else settings.bullet_starts
 
 
 def agreement(controller: Any, moments: Moments) -> Row:

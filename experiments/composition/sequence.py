@@ -5,7 +5,7 @@ to the blue lamp: the way to the yellow one is the mirror image of that program.
 the transition between them are one hypervector.
 
     torchvsa sequence
-    torchvsa sequence arenas=[lamp_room] starts=100 bullet_starts=0
+    torchvsa sequence arenas=[lamp_room] starts=100 bullet_starts=0 wheeled_starts=0
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 import sim
@@ -27,6 +26,7 @@ from experiments.kit.study import plain_page
 from experiments.tasks import corral
 from experiments.tasks import two_lamps as task
 from experiments.tasks.agreement import share_right
+from experiments.tasks.in_bullet import TWINS
 
 TEACHER, VECTOR, COMMON = "teacher", "one_vector", "one_vector_common"
 """The rows of the table: five rules for each lamp in turn; one hypervector; the same from starts the teacher solves."""
@@ -42,6 +42,7 @@ class Sequence(Settings):
     )
     starts: int = corral.episodes(500, "held-out starts, divided among the codebooks")
     bullet_starts: int = corral.episodes(200, "the first of them that are driven in the physics engine, too", low=0)
+    wheeled_starts: int = corral.episodes(50, "the same on the wheeled body", low=0)
     codebooks: int = setting(10, "draws of codebooks and contexts", low=1, high=MOST_CODEBOOKS)
     demonstrations: int = corral.episodes(20, "runs of the teacher to the blue lamp to learn from")
     heldout: int = corral.episodes(200, "runs of the teacher to the yellow lamp about which 'to yellow' is asked")
@@ -58,7 +59,7 @@ def check(settings: Sequence) -> None:
     for name in settings.arenas:
         if name not in fit:
             raise ValueError(f"arenas: {name} has no blue lamp and then a yellow one; choose from {', '.join(fit)}")
-    for name in ("starts", "bullet_starts"):
+    for name in ("starts", "bullet_starts", "wheeled_starts"):
         if 0 < (given := getattr(settings, name)) < settings.codebooks or (name == "starts" and not given):
             raise ValueError(f"{name}={given}: expected at least one for each of codebooks={settings.codebooks}")
     if settings.dim % 2:
@@ -120,16 +121,16 @@ def measure(material: Material, cell: Cell) -> list[Row]:
 
 
 def drive(settings: Sequence, arena: str, controller: sim.ControllerLike, codebook: int | None = None) -> list[Row]:
-    """A row for each engine and start, of all or of those of one codebook."""
+    """A row for each engine and start; a codebook has every start whose number is it modulo their count."""
     rows = []
-    for engine, count in (("vector", settings.starts), ("bullet", settings.bullet_starts)):
+    counts = {"vector": settings.starts, "bullet": settings.bullet_starts, "wheeled": settings.wheeled_starts}
+    for engine, count in counts.items():
         if count:
-            chosen = (
-                np.arange(count) if codebook is None else np.array_split(np.arange(count), settings.codebooks)[codebook]
-            )
+            chosen = range(count) if codebook is None else range(codebook, count, settings.codebooks)
             driven = sim.rollout(
-                controller, arena, task=task.TASK, episodes=chosen.tolist(), seed=settings.seed,
-                seconds=settings.seconds, engine=engine, record=False,
+                controller, arena, task=task.TASK, episodes=chosen, seed=settings.seed,
+                seconds=settings.seconds, engine="bullet" if engine in TWINS else engine, body=TWINS.get(engine),
+                record=False,
             )  # fmt: skip
             for start, success in zip(driven.episode.tolist(), driven.success.tolist(), strict=True):
                 row = TEACHER if codebook is None else VECTOR
@@ -147,6 +148,11 @@ def summarise(settings: Sequence, records: pd.DataFrame) -> list[Row]:
         rows[COMMON] = rows[VECTOR].loc[solved]
         for name, own in rows.items():
             row = {**cell, "row": name, **corral.success(len(own), int(own.success.sum()))}
+            if cell["engine"] != "vector":
+                before = records.loc[
+                    (records.arena == cell["arena"]) & (records.engine == "vector") & (records.row == own.row.iloc[0])
+                ].set_index("episode")
+                row |= mean("minus_vector", own.success.astype(float) - before.success.loc[own.index].astype(float))
             if name == VECTOR and cell["engine"] == "vector":
                 shares = own.groupby("codebook").agreement.first()
                 row |= mean("agreement", shares)
@@ -181,6 +187,10 @@ TABLE = Table(
         Column("success_rate", "success", ".3f", interval=("success_low", "success_high"), about=(
             "robots that touch the blue lamp and then stay at the yellow one, with Wilson's 95 % interval"
         )),
+        Column("minus_vector", "less vector", "+.3f", ("minus_vector_low", "minus_vector_high"), about=(
+            "success in the physics engine, planar (bullet) or on wheels, less that in vector, from the same starts "
+            "with the same codebooks and wheel noise; bootstrap over the starts"
+        )),
         Column("agreement", format=".3f", interval=("agreement_low", "agreement_high"), about=(
             "share of the teacher's moments on its way to the yellow lamp in which 'to yellow' commands the same, mean "
             "over codebooks, with their bootstrap"
@@ -193,10 +203,10 @@ these runs, with its own pair of light sensors and the distance. In the codes on
 mirror image of the program is 'to yellow', which nobody demonstrated. The transition is learned from the same readings:
 at the blue lamp, hand over; before it, go on.
 
-The starts are divided among the codebooks. All rows of an arena and an engine drive from the same starts, with the same
-wheel noise.
+Start e is driven with codebook e mod their number. All rows of an arena and an engine drive from the same starts, with
+the same wheel noise.
 """
-QUICK = {"arenas": ["lamp_room"], "starts": 20, "bullet_starts": 0, "codebooks": 2, "heldout": 20}
+QUICK = {"arenas": ["lamp_room"], "starts": 20, "bullet_starts": 0, "wheeled_starts": 0, "codebooks": 2, "heldout": 20}
 
 study = Study(
     name="sequence",

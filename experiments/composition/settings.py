@@ -46,12 +46,14 @@ class Composition(Combining):
     )
     bullet_rows: list[str] = setting(
         ["teacher", "joint_program", "evident_sum", "masked_priority"],
-        "rows that drive in the physics engine, too", choices=rows_known, distinct=True, empty=True,
+        "rows that drive in the physics engine, too, planar and on wheels", choices=rows_known, distinct=True,
+        empty=True,
     )  # fmt: skip
     arenas: list[str] = setting(ARENAS, "where they drive; all learn in `default`", choices=sim.ARENAS, distinct=True)
     starts: int = corral.episodes(1000, "held-out starts in default and large, over all codebooks")
     other_starts: int = corral.episodes(500, "held-out starts in every other arena")
-    bullet_starts: int = corral.episodes(200, "held-out starts in the physics engine")
+    bullet_starts: int = corral.episodes(200, "the first of these starts, in the physics engine, too, for bullet_rows")
+    wheeled_starts: int = corral.episodes(50, "the same on the wheeled body", low=0)
     heldout: int = corral.episodes(200, "episodes of the teacher in each arena about which programs are asked")
 
 

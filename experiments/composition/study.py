@@ -12,18 +12,19 @@ from __future__ import annotations
 import pandas as pd
 
 from experiments.composition import figures
-from experiments.composition.measure import measure, prepare, success_interval
+from experiments.composition.measure import measure, prepare, success_interval, twin_starts
 from experiments.composition.rows import line_of
 from experiments.composition.settings import PRESETS, Composition, check
 from experiments.kit import Cell, Column, Drawing, Outcome, Page, Row, Study, Table, grid
 from experiments.kit.intervals import mean
 from experiments.kit.study import plain_page
+from experiments.tasks.in_bullet import TWINS
 
 
 def cells(settings: Composition) -> list[Cell]:
     """A cell for each row, and for those that drive in the physics engine, too; these take longest."""
-    slow = grid(row=settings.bullet_rows, engine=["bullet"])
-    return slow + grid(row=settings.rows, engine=["vector"])
+    twins = [engine for engine in reversed(TWINS) if twin_starts(settings, engine)]
+    return grid(engine=[*twins], row=settings.bullet_rows) + grid(row=settings.rows, engine=["vector"])
 
 
 def summarise(settings: Composition, records: pd.DataFrame) -> list[Row]:
@@ -33,7 +34,7 @@ def summarise(settings: Composition, records: pd.DataFrame) -> list[Row]:
         for arena in settings.arenas:
             chosen = (records.row == cell["row"]) & (records.engine == cell["engine"]) & (records.arena == arena)
             own = records.loc[chosen]
-            name = cell["row"] if cell["engine"] == "vector" else f"{cell['row']}_bullet"
+            name = cell["row"] if cell["engine"] == "vector" else f"{cell['row']}_{cell['engine']}"
             low, high = success_interval(own)
             row = {
                 "row": name, "arena": arena, "starts": int(own.episodes.sum()),
@@ -44,8 +45,12 @@ def summarise(settings: Composition, records: pd.DataFrame) -> list[Row]:
                 for column in ("agreement", "agreement_avoid", "agreement_distinct"):
                     row |= {**mean(column, own[column].dropna()), f"{column}_least": own[column].min()}
                 row["ceiling"] = own.ceiling.iloc[0]
+            else:
+                twin = (records.row == cell["row"]) & (records.engine == "vector") & (records.arena == arena)
+                before = records.loc[twin, f"{cell['engine']}_successes"].sum()
+                row["minus_vector"] = float(own.successes.sum() - before) / row["starts"]
             table.append(row)
-    order = [*settings.rows, *(f"{name}_bullet" for name in settings.bullet_rows)]
+    order = [*settings.rows, *(f"{name}_{engine}" for engine in TWINS for name in settings.bullet_rows)]
     return sorted(table, key=lambda row: order.index(row["row"]))
 
 
@@ -90,6 +95,9 @@ COLUMNS = [
     Column("success_rate", "success", ".3f", interval=("success_low", "success_high"), about=(
         "robots at the lamp at the end; the wider of Wilson's interval over starts and the bootstrap's over codebooks"
     )),
+    Column("minus_vector", "less vector", "+.3f", about=(
+        "success less that of the same row in `vector`, from the same first starts with the same wheel noise"
+    )),
     Column("agreement", format=".3f", interval=("agreement_low", "agreement_high"), about=(
         "share of the teacher's moments with its commands, mean over codebooks, with their bootstrap"
     )),
@@ -104,8 +112,8 @@ COLUMNS = [
 
 METHOD = """
 The teacher drives in the arena `default`; these runs are all that is shown. Three behaviours (seek light, avoid,
-cruise) learn from the moments in which their own rules fired. Rows that end in `_bullet` repeat others in the physics
-engine.
+cruise) learn from the moments in which their own rules fired. Rows that end in `_bullet` and `_wheeled` repeat others
+in the physics engine, with the planar and the wheeled body.
 
 Start e drives with codebook e mod their number: an interval counts both. Agreement is over moments of 200 held-out runs
 of the teacher in the same arena, before it reaches the lamp.

@@ -15,14 +15,13 @@ from experiments.models import hand_written
 from experiments.models.baselines import CLASSIFIERS, Classified, RandomCommands
 from experiments.tasks import corral
 from experiments.tasks.agreement import share_right
+from experiments.tasks.in_bullet import TWINS
 
 if TYPE_CHECKING:
     from experiments.corral.settings import Corral
 
 MANY_STARTS = ("teacher", "default", "bundled")
 """The rows that drive `starts` episodes; those on wheels drive `wheeled_starts`, all others `other_starts`."""
-TWINS = {"bullet": "planar", "wheeled": "wheeled"}
-"""Endings of rows that repeat another row in the physics engine, with the robot's body there."""
 
 
 @dataclass(frozen=True)

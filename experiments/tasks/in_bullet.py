@@ -15,6 +15,8 @@ from experiments.tasks import corral
 
 BODIES = {"planar": "bullet_starts", "wheeled": "wheeled_starts"}
 """The robot's bodies there, and the settings with the numbers of their starts."""
+TWINS = {"bullet": "planar", "wheeled": "wheeled"}
+"""What rows and engines that repeat others there are called, and the robot's body."""
 EFFECTS = {"same": 0, "gained": 1, "lost": -1}
 """What the physics engine may make of a start: a success of what was none, or the reverse."""
 

@@ -19,6 +19,7 @@ from experiments.models.behaviour_tree import BehaviourTree
 from experiments.tasks import corral
 from experiments.tasks.asked_once import EachAskedOnce
 from experiments.tasks.behaviours import BEHAVIOURS, Precedence
+from experiments.tasks.in_bullet import TWINS
 from torchvsa.registry import Registry
 
 SMALL = ("vsa.dim=512", "demonstrations=6", "heldout=3", "codebooks=2", "seconds=12")
@@ -32,13 +33,20 @@ def shown() -> Shown:
 def test_rows_drive_in_each_arena_with_several_codebooks(tmp_path: Path) -> None:
     settings = composed(
         study, *SMALL, "rows=[teacher,joint_program,evident_sum,masked_sum,plain_sum,gated]", "bullet_rows=[teacher]",
-        "arenas=[default,large]", "starts=6", "bullet_starts=2", "workers=1",
+        "arenas=[default,large]", "starts=6", "bullet_starts=4", "wheeled_starts=2", "workers=1",
     )  # fmt: skip
     outcome = run(study, settings, tmp_path, Console(quiet=True))
-    assert len(outcome.table) == 7 * 2
+    assert len(outcome.table) == 8 * 2
     rows = {(row["row"], row["arena"]): row for row in outcome.table}
     assert rows["teacher", "default"]["agreement"] == 1.0
-    assert rows["teacher_bullet", "large"]["starts"] == 2
+    for twin, count in (("bullet", 4), ("wheeled", 2)):
+        row, first = rows[f"teacher_{twin}", "large"], range(count)
+        driven = [
+            sim.rollout(sim.Teacher(), "large", body, first, seconds=settings.seconds, engine=engine).success.mean()
+            for engine, body in (("bullet", TWINS[twin]), ("vector", "planar"))
+        ]
+        assert (row["starts"], row["success_rate"]) == (count, driven[0])
+        assert row["minus_vector"] == pytest.approx(driven[0] - driven[1])
     found = outcome.records.loc[(outcome.records.row == "evident_sum") & (outcome.records.arena == "default")]
     assert found.episodes.tolist() == [3, 3]
     assert outcome.metrics["evident_sum.default.agreement"] == pytest.approx(found.agreement.mean())

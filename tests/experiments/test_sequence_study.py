@@ -18,10 +18,21 @@ from experiments.tasks import two_lamps
 @pytest.mark.slow
 def test_a_robot_goes_to_the_lamp_that_was_never_demonstrated(tmp_path: Path) -> None:
     settings = composed(
-        study, "arenas=[lamp_room]", "codebooks=2", "starts=6", "bullet_starts=0", "heldout=4", "workers=1"
-    )
+        study, "arenas=[lamp_room]", "codebooks=2", "starts=6", "bullet_starts=2", "wheeled_starts=2", "heldout=4",
+        "workers=1",
+    )  # fmt: skip
     outcome = run(study, settings, tmp_path, Console(quiet=True))
-    rows = {row["row"]: row for row in outcome.table}
+    driven = outcome.records.loc[outcome.records.row == "one_vector"].groupby("engine")[["episode", "codebook"]]
+    places = {engine: sorted(zip(own.episode, own.codebook, strict=True)) for engine, own in driven}
+    assert places == {
+        engine: [(start, start % 2) for start in range(count)]
+        for engine, count in (("vector", 6), ("bullet", 2), ("wheeled", 2))
+    }
+    for row in outcome.table:
+        if row["engine"] != "vector":
+            assert row["minus_vector"] == row["success_rate"] - 1
+            assert row["episodes"] == 2 or (row["row"], row["engine"]) == ("one_vector_common", "wheeled")
+    rows = {row["row"]: row for row in outcome.table if row["engine"] == "vector"}
     assert {name: row["success_rate"] for name, row in rows.items()} == {
         "teacher": 1.0,
         "one_vector": 1.0,
