@@ -167,7 +167,7 @@ def draw(rows: Sequence[Row]) -> bytes:
     axes.set_xlabel("times faster than the peer")
     if compared:
         axes.set_title(rows[0]["machine"], fontsize=9)
-        axes.legend()
+        figure.legend(loc="outside upper right", ncols=2)
     content = io.BytesIO()
     figure.savefig(content, format="png", dpi=130)
     return content.getvalue()
