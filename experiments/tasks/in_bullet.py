@@ -33,11 +33,12 @@ class InBullet(corral.Driving):
 
 def check(settings: InBullet, any_drive: bool = True) -> None:
     """Raise for an engine that is not installed, or does not have the body; `any_drive`: in the physics engine, too."""
-    try:
-        corral.check_driving(settings, *(["bullet"] if any_drive and counts(settings) else []))
-    except ValueError as error:
-        without = "" if settings.engine == "bullet" else "; or leave it out: bullet_starts=0 wheeled_starts=0"
-        raise ValueError(f"{error}{without}") from None
+    corral.check_driving(settings)
+    if any_drive and counts(settings):
+        try:
+            corral.check_driving(settings, "bullet")
+        except ValueError as error:
+            raise ValueError(f"{error}; or leave it out: bullet_starts=0 wheeled_starts=0") from None
 
 
 def counts(settings: InBullet) -> dict[str, int]:

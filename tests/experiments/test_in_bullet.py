@@ -99,6 +99,11 @@ def test_in_the_physics_engine_nothing_drives_twice(tmp_path: Path) -> None:
     assert not any(row.get("planar_starts") for row in table)
 
 
+def test_another_mistake_is_told_as_it_is() -> None:
+    with pytest.raises(ValueError, match=r"choose engine=bullet$"):
+        check_all(STUDIES["robustness"], settings("robustness", "body=wheeled"))
+
+
 def test_without_pybullet_it_is_said_how_to_go_on(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(corral, "find_spec", lambda name: None)
     with pytest.raises(ValueError, match=r"pybullet.*or leave it out: bullet_starts=0 wheeled_starts=0$"):
