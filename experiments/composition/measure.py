@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -22,7 +22,7 @@ from experiments.kit.store import write_frame
 from experiments.tasks import agreement as agreeing
 from experiments.tasks import corral
 from experiments.tasks.asked_once import AskedOnce, EachAskedOnce
-from experiments.tasks.in_bullet import TWINS
+from experiments.tasks.in_bullet import TWINS, there
 from experiments.tasks.recorded import frame_of
 from sim.statistics import wilson
 
@@ -119,9 +119,8 @@ def measure(material: Material, cell: Cell) -> list[Row]:
     asked = made if together is None else [together.alone(codebook) for codebook in draws]
     # The moments first: robots meet most of their conditions again, and many are asked faster at once.
     agreed = {name: [agreement(one, material.moments[name]) for one in asked] for name in settings.arenas}
-    driving = settings
-    if body := TWINS.get(cell["engine"]):
-        driving = replace(settings, engine="bullet", body=body, robots=None)
+    body = TWINS.get(cell["engine"])
+    driving = settings if body is None else there(settings, body)
     found = []
     for name in settings.arenas:
         keep = name == PATHS_IN and cell["engine"] == "vector"

@@ -15,7 +15,7 @@ from experiments.models import hand_written
 from experiments.models.baselines import CLASSIFIERS, Classified, RandomCommands
 from experiments.tasks import corral
 from experiments.tasks.agreement import share_right
-from experiments.tasks.in_bullet import TWINS
+from experiments.tasks.in_bullet import TWINS, there
 
 if TYPE_CHECKING:
     from experiments.corral.settings import Corral
@@ -88,7 +88,7 @@ def original(name: str) -> str:
 def driving(settings: Corral, name: str) -> Corral:
     """The settings of the run with the engine and the body of a row."""
     body = TWINS.get(name.rpartition("_")[2])
-    return settings if body is None else replace(settings, engine="bullet", body=body, robots=None)
+    return settings if body is None else there(settings, body)
 
 
 def starts(settings: Corral, name: str) -> int:

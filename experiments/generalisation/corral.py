@@ -192,7 +192,7 @@ def measure(material: Material, cell: Cell) -> list[Row]:
         if changes == 0 or (changes == 1 and (arena == HOME or count == most)):
             rollout = drive(settings, controller, episodes, arena)
             row |= counts_of(rollout)
-            if changes == 0 and count == most and learner not in settings.baselines:
+            if changes == 0 and count == most:
                 row |= in_bullet.counted(in_bullet.effects(settings, controller, rollout, arena))
         rows.append(row)
     return rows

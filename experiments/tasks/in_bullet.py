@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 import pandas as pd
@@ -13,6 +14,7 @@ from experiments.kit import Column, Row, Table
 from experiments.kit.intervals import mean
 from experiments.tasks import corral
 
+D = TypeVar("D", bound=corral.Driving)
 BODIES = {"planar": "bullet_starts", "wheeled": "wheeled_starts"}
 """The robot's bodies there, and the settings with the numbers of their starts."""
 TWINS = {"bullet": "planar", "wheeled": "wheeled"}
@@ -48,6 +50,11 @@ def counts(settings: InBullet) -> dict[str, int]:
     return {body: count for body, name in BODIES.items() if (count := getattr(settings, name))}
 
 
+def there(settings: D, body: str) -> D:
+    """The same settings in the physics engine, with this body."""
+    return replace(settings, engine="bullet", body=body, robots=None)
+
+
 def effects(
     settings: InBullet, policy: sim.ControllerLike, rollout: sim.Rollout, arena: str | sim.Arena = "default"
 ) -> dict[str, list[int]]:
@@ -56,8 +63,7 @@ def effects(
     for body, count in counts(settings).items():
         first = rollout.episode < count
         if first.any():
-            there = replace(settings, engine="bullet", body=body, robots=None)
-            driven = corral.drive(there, policy, rollout.episode[first].tolist(), arena)
+            driven = corral.drive(there(settings, body), policy, rollout.episode[first].tolist(), arena)
             found[body] = (driven.success.astype(int) - rollout.success[first]).tolist()
     return found
 
