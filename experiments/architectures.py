@@ -24,7 +24,7 @@ from behaviours import Space
 from behaviours.learning import ConvergenceWarning
 from experiments.kit import Cell, Column, Drawing, Outcome, Part, Row, Study, Table, part, parts, setting
 from experiments.kit.intervals import proportion
-from experiments.tasks import corral
+from experiments.tasks import corral, in_bullet
 from experiments.tasks.agreement import compare
 from experiments.tasks.timing import query_seconds
 from torchvsa import ARCHITECTURES, architecture_near
@@ -36,7 +36,7 @@ BOTH = ["threshold_features", "random_fourier"]
 
 
 @dataclass
-class Architectures(corral.Driving):
+class Architectures(in_bullet.InBullet):
     """The settings of this study."""
 
     architectures: list[str] = setting(
@@ -58,6 +58,13 @@ class Architectures(corral.Driving):
     demonstrations: int = corral.episodes(20, "episodes of the teacher to learn from")
     starts: int = corral.episodes(200, "held-out starts")
     repeats: int = setting(2, "draws of the codebooks", low=1)
+    bullet_encoders: list[str] = setting(
+        ["product of level"], "those of the encoders with which robots drive in the physics engine, too, of every "
+        "architecture that supports them and with each draw", choices=lambda: every_condition(), distinct=True,
+        empty=True,
+    )  # fmt: skip
+    bullet_starts: int = corral.episodes(50, "their first starts, driven in the physics engine, too; 0: none", low=0)
+    wheeled_starts: int = corral.episodes(20, "the same on the wheeled body", low=0)
 
 
 def compared(settings: Architectures) -> list[str]:
@@ -67,8 +74,17 @@ def compared(settings: Architectures) -> list[str]:
 
 def conditions(settings: Architectures) -> list[str]:
     """The names of all ways to encode a condition."""
-    joined = [f"{record} of {code}" for record in settings.records if record in RECORDS for code in settings.encoders]
-    return joined + [record for record in settings.records if record in BOTH]
+    return _named(settings.records, settings.encoders)
+
+
+def every_condition() -> list[str]:
+    """The same of any settings."""
+    return _named([*RECORDS, *BOTH], list(VALUE_ENCODERS))
+
+
+def _named(records: list[str], codes: list[str]) -> list[str]:
+    joined = [f"{record} of {code}" for record in records if record in RECORDS for code in codes]
+    return joined + [record for record in records if record in BOTH]
 
 
 def plan(settings: Architectures, architecture: str, encoder: str) -> Encoder:
@@ -108,7 +124,7 @@ def cells(settings: Architectures) -> list[Cell]:
 
 def check(settings: Architectures) -> None:
     """Raise unless there is something to compare, and a robot that can drive."""
-    corral.check_driving(settings)
+    in_bullet.check(settings, bool(settings.bullet_encoders))
     if not cells(settings):
         raise ValueError(
             f"records={settings.records}: no architecture supports them; "
@@ -136,6 +152,7 @@ def measure(material: dict[str, Any], cell: Cell) -> Row:
         behaviour = parts.rule(settings.rule).fit(own, train)
     found = compare(behaviour, own, train, held_out, own)
     rollout = corral.drive(settings, behaviour, range(settings.starts))
+    in_both = cell["encoder"] in settings.bullet_encoders
     return {
         "dim": own.vsa.dim,
         "success": int(rollout.success.sum()),
@@ -145,6 +162,7 @@ def measure(material: dict[str, Any], cell: Cell) -> Row:
         "wrong": behaviour.report.wrong,
         "query_us": 1e6 * query_seconds(behaviour.freeze(), held_out.sensors.numpy()),
         "bytes": behaviour.program.nbytes,
+        **(in_bullet.counted(in_bullet.effects(settings, behaviour, rollout)) if in_both else {}),
     }
 
 
@@ -152,12 +170,12 @@ def summarise(settings: Architectures, records: pd.DataFrame) -> list[Row]:
     """A row for each architecture and encoder: the mean over the draws, success of all starts together."""
     rows = []
     for name, encoder in itertools.product(compared(settings), conditions(settings)):
-        own = records[(records.architecture == name) & (records.encoder == encoder)]
+        own = records.loc[(records.architecture == name) & (records.encoder == encoder)]
         if own.empty:
             continue
         means = own[["dim", "agreement", "train_agreement", "pairs", "wrong", "bytes"]].mean().to_dict()
         reached = proportion("success", int(own.success.sum()), settings.starts * len(own))
-        row = {"architecture": name, "encoder": encoder, **means, **reached}
+        row = {"architecture": name, "encoder": encoder, **means, **reached, **in_bullet.differences(own)}
         rows.append({**row, "worst": own.success.min() / settings.starts, "query_us": own.query_us.median()})
     return rows
 
@@ -198,13 +216,15 @@ def maps(outcome: Outcome) -> Figure:
 
 
 def tables(outcome: Outcome) -> list[Table]:
-    """What was measured; and what the algebra refuses."""
+    """What was measured; the same in the physics engine; and what the algebra refuses."""
     refused = [
         {"architecture": name, "encoder": encoder, "why": why}
         for name, encoder in itertools.product(compared(outcome.settings), conditions(outcome.settings))
         if (why := refusal(outcome.settings, name, encoder))
     ]
-    shown = [TABLE.show(outcome.table)]
+    about = "Those with an encoder of `bullet_encoders`, from their first starts with each draw of the codebooks."
+    keys = [Column("architecture"), Column("encoder")]
+    shown = [TABLE.show(outcome.table), *in_bullet.tables(keys, outcome.table, about)]
     return [*shown, REFUSED.show(refused)] if refused else shown
 
 
@@ -230,10 +250,13 @@ TABLE = Table(
 REFUSED = Table("What is refused, and why", [Column("architecture"), Column("encoder"), Column("why")])
 METHOD = """
 All architectures learn from the same runs of the teacher by the same rule, and drive from the same starts, each with
-its own codebooks. Whatever an encoder needs and the architecture lacks is refused before anything is driven.
+its own codebooks. Whatever an encoder needs and the architecture lacks is refused before anything is driven. With the
+encoders `bullet_encoders` robots drive in the physics engine, too, from the first `bullet_starts` and `wheeled_starts`
+starts.
 """
 FIGURE = Drawing("architectures", maps, "success and agreement of each architecture with each encoder")
-QUICK = {"dim": 500, "demonstrations": 10, "starts": 20, "repeats": 1, "encoders": ["level"], "records": ["product"]}
+QUICK = {"dim": 500, "demonstrations": 10, "starts": 20, "repeats": 1, "encoders": ["level"], "records": ["product"],
+         "bullet_starts": 0, "wheeled_starts": 0}  # fmt: skip
 
 study = Study(
     name="architectures",

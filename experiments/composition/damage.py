@@ -30,7 +30,7 @@ from experiments.kit.figures import legend_below, lines
 from experiments.kit.intervals import mean
 from experiments.models.damage import Array, Damage
 from experiments.models.disturbances import Disturbed, Noisy, disturb_in_turns
-from experiments.tasks import corral
+from experiments.tasks import corral, in_bullet
 from experiments.tasks.asked_once import EachAskedOnce
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ KEYS = ("row", "damage", "level")
 
 
 @dataclass
-class Damaged(Combining):
+class Damaged(Combining, in_bullet.InBullet):
     """The settings of this study."""
 
     arena: Part = part("arena", "default", "where they are asked and drive; all learn in `default`")
@@ -54,6 +54,14 @@ class Damaged(Combining):
         [0.02, 0.05, 0.1], "standard deviations of the sensors' noise, as shares of their ranges",
         low=0, distinct=True, empty=True,
     )  # fmt: skip
+    bullet_rows: list[str] = setting(
+        ["joint_program", "evident_sum"], "those of the rows that drive in the physics engine, too",
+        choices=rows_known, distinct=True, empty=True,
+    )  # fmt: skip
+    bullet_flips: list[float] = setting(
+        [0.0, 0.3], "those of the flips with which they do; 0: undamaged", low=0, high=1, distinct=True, empty=True
+    )
+    bullet_noise: list[float] = setting([0.1], "and those of the noise", above=0, distinct=True, empty=True)
     starts: int = corral.episodes(200, "held-out starts, over all codebooks")
     heldout: int = corral.episodes(100, "episodes of the teacher about which programs are asked")
     kept: float = setting(0.95, "a level is survived if this share of the undamaged agreement is left", above=0, high=1)
@@ -63,7 +71,7 @@ def check(settings: Damaged) -> None:
     """Raise for what cannot be learned, and for rows without vectors that can be damaged."""
     space = check_rows(settings, settings.rows)
     corral.arena(settings.arena)
-    corral.check_driving(settings)
+    in_bullet.check(settings, bool(settings.bullet_rows))
     if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex:
         raise ValueError(f"damage flips the signs of real numbers, of which {space.vsa.name} has none; try vsa=map_c")
     if not space.encoder.discrete:
@@ -128,10 +136,10 @@ def measure(material: Material, cell: Cell) -> list[Row]:
     found = []
     for level in (0.0, *settings.flips):
         copies = [flipped(one, level, (settings.seed, number)) for number, one in enumerate(made)]
-        found += driven(material, EachAskedOnce(copies), 0.0, {"damage": FLIPPED, "level": level})
+        found += driven(material, EachAskedOnce(copies), 0.0, {**cell, "damage": FLIPPED, "level": level})
     each = EachAskedOnce(made)
     for level in settings.noise:
-        found += driven(material, each, level, {"damage": NOISY, "level": level})
+        found += driven(material, each, level, {**cell, "damage": NOISY, "level": level})
     # What is not damaged at all is the beginning of both.
     first = [row for row in found if row["level"] == 0]
     return found + [{**row, "damage": NOISY} for row in first if settings.noise]
@@ -146,7 +154,9 @@ def driven(material: Material, each: EachAskedOnce, noise: float, factors: Row) 
     answer, _ = each.step(disturb_in_turns([disturbance], heldout.sensors.numpy(), episodes), owner)
     right = (levels(answer.commands) == levels(heldout.commands)).all(-1).numpy()
     driver = Disturbed(disturbance, each)
-    run = corral.drive(settings, driver, range(settings.starts), corral.arena(settings.arena))
+    where = corral.arena(settings.arena)
+    run = corral.drive(settings, driver, range(settings.starts), where)
+    again = in_bullet.effects(settings, driver, run, where) if in_both(settings, factors) else {}
     return [
         {
             **factors,
@@ -154,9 +164,16 @@ def driven(material: Material, each: EachAskedOnce, noise: float, factors: Row) 
             "episodes": int((run.episode % settings.codebooks == codebook).sum()),
             "successes": int(run.success[run.episode % settings.codebooks == codebook].sum()),
             "agreement": float(right[owner == codebook].mean()) if (owner == codebook).any() else None,
+            **in_bullet.counted({body: effects[codebook :: settings.codebooks] for body, effects in again.items()}),
         }
         for codebook in range(settings.codebooks)
     ]
+
+
+def in_both(settings: Damaged, factors: Row) -> bool:
+    """Whether robots of a row drive with this damage in the physics engine, too."""
+    levels = settings.bullet_flips if factors["damage"] == FLIPPED else settings.bullet_noise
+    return factors["row"] in settings.bullet_rows and factors["level"] in levels
 
 
 def summarise(settings: Damaged, records: pd.DataFrame) -> list[Row]:
@@ -178,7 +195,7 @@ def summarise(settings: Damaged, records: pd.DataFrame) -> list[Row]:
                         "success_rate": own.successes.sum() / own.episodes.sum(), "success_low": low,
                         "success_high": high, **mean("agreement", agreement),
                         "agreement_least": float(agreement.min()),
-                        "kept": float(agreement.mean()) / whole,
+                        "kept": float(agreement.mean()) / whole, **in_bullet.differences(own),
                     }
                 )  # fmt: skip
     return table
@@ -221,6 +238,33 @@ def curves(outcome: Outcome) -> Figure:
     return figure
 
 
+def tables(outcome: Outcome) -> list[Table]:
+    """What was measured; and the same in the physics engine, where what is not damaged at all is one row."""
+    once = [row for row in outcome.table if row["level"] or row["damage"] == FLIPPED]
+    driven = [row if row["level"] else {**row, "damage": None} for row in once]
+    about = "The first starts of `bullet_rows`, undamaged and with `bullet_flips` and `bullet_noise`, of all codebooks."
+    return [TABLE.show(outcome.table), *in_bullet.tables(KEY_COLUMNS, driven, about)]
+
+
+KEY_COLUMNS = [
+    Column("row"),
+    Column("damage"),
+    Column("level", format=".2f", about="share of elements, or of the sensor's range"),
+]
+TABLE = Table(
+    "What damage leaves",
+    [
+        *KEY_COLUMNS,
+        Column("success_rate", "success", ".3f", interval=("success_low", "success_high"), about=(
+            "robots at the lamp at the end; the wider of Wilson's interval and the bootstrap over codebooks"
+        )),
+        Column("agreement", format=".3f", interval=("agreement_low", "agreement_high"), about=(
+            "share of the teacher's moments with its commands, mean over codebooks, with their bootstrap"
+        )),
+        Column("agreement_least", "worst", ".3f", about="that of the worst codebook"),
+        Column("kept", format=".3f", about="share of the undamaged agreement that is left"),
+    ],
+)  # fmt: skip
 METHOD = """
 Rows are those of the study composition. A share of the elements of all vectors on which a row's answers depend has its
 sign flipped, drawn anew for each codebook: of one sum its program; of a gated vector that and the sums of known
@@ -239,22 +283,7 @@ study = Study(
     measure=measure,
     summarise=summarise,
     keys=KEYS,
-    table=Table(
-        "What damage leaves",
-        [
-            Column("row"),
-            Column("damage"),
-            Column("level", format=".2f", about="share of elements, or of the sensor's range"),
-            Column("success_rate", "success", ".3f", interval=("success_low", "success_high"), about=(
-                "robots at the lamp at the end; the wider of Wilson's interval and the bootstrap over codebooks"
-            )),
-            Column("agreement", format=".3f", interval=("agreement_low", "agreement_high"), about=(
-                "share of the teacher's moments with its commands, mean over codebooks, with their bootstrap"
-            )),
-            Column("agreement_least", "worst", ".3f", about="that of the worst codebook"),
-            Column("kept", format=".3f", about="share of the undamaged agreement that is left"),
-        ],
-    ),
+    tables=tables,
     figures=[
         Drawing("damage", curves, "agreement and success against the share of damage, a line for each row",
                 "Bands: 95 % intervals over starts and codebooks."),
@@ -263,6 +292,6 @@ study = Study(
     method=METHOD,
     presets={"quick": {
         "rows": ["joint_program", "evident_sum", "gated"], "flips": [0.2, 0.4], "noise": [0.05], "starts": 40,
-        "heldout": 10, "codebooks": 2, "demonstrations": 20,
+        "heldout": 10, "codebooks": 2, "demonstrations": 20, "bullet_starts": 0, "wheeled_starts": 0,
     }},
 )  # fmt: skip

@@ -22,7 +22,7 @@ from experiments.kit.store import write_frame
 from experiments.tasks import agreement as agreeing
 from experiments.tasks import corral
 from experiments.tasks.asked_once import AskedOnce, EachAskedOnce
-from experiments.tasks.in_bullet import TWINS, there
+from experiments.tasks.in_bullet import TWINS, there, twin_starts
 from experiments.tasks.recorded import frame_of
 from sim.statistics import wilson
 
@@ -157,11 +157,6 @@ def starts(settings: Composition, cell: Cell, arena: str) -> int:
     """How many held-out starts a cell drives in an arena."""
     full = settings.starts if arena in FULL else settings.other_starts
     return min(full, twin_starts(settings, cell["engine"])) if cell["engine"] in TWINS else full
-
-
-def twin_starts(settings: Composition, engine: str) -> int:
-    """How many of the first starts a row drives again in the physics engine."""
-    return settings.wheeled_starts if engine == "wheeled" else settings.bullet_starts
 
 
 def agreement(controller: Any, moments: Moments) -> Row:

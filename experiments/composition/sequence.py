@@ -26,7 +26,7 @@ from experiments.kit.study import plain_page
 from experiments.tasks import corral
 from experiments.tasks import two_lamps as task
 from experiments.tasks.agreement import share_right
-from experiments.tasks.in_bullet import TWINS
+from experiments.tasks.in_bullet import TWINS, twin_starts
 
 TEACHER, VECTOR, COMMON = "teacher", "one_vector", "one_vector_common"
 """The rows of the table: five rules for each lamp in turn; one hypervector; the same from starts the teacher solves."""
@@ -123,7 +123,7 @@ def measure(material: Material, cell: Cell) -> list[Row]:
 def drive(settings: Sequence, arena: str, controller: sim.ControllerLike, codebook: int | None = None) -> list[Row]:
     """A row for each engine and start; a codebook has every start whose number is it modulo their count."""
     rows = []
-    counts = {"vector": settings.starts, "bullet": settings.bullet_starts, "wheeled": settings.wheeled_starts}
+    counts = {"vector": settings.starts, **{twin: twin_starts(settings, twin) for twin in TWINS}}
     for engine, count in counts.items():
         if count:
             chosen = range(count) if codebook is None else range(codebook, count, settings.codebooks)

@@ -12,13 +12,13 @@ from __future__ import annotations
 import pandas as pd
 
 from experiments.composition import figures
-from experiments.composition.measure import measure, prepare, success_interval, twin_starts
+from experiments.composition.measure import measure, prepare, success_interval
 from experiments.composition.rows import line_of
 from experiments.composition.settings import PRESETS, Composition, check
 from experiments.kit import Cell, Column, Drawing, Outcome, Page, Row, Study, Table, grid
 from experiments.kit.intervals import mean
 from experiments.kit.study import plain_page
-from experiments.tasks.in_bullet import TWINS
+from experiments.tasks.in_bullet import TWINS, twin_starts
 
 
 def cells(settings: Composition) -> list[Cell]:

@@ -17,14 +17,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+import sim
 from behaviours import Demonstrations
 from experiments.kit import Cell, Column, Drawing, Outcome, Row, Study, Table, aggregated, setting
 from experiments.kit.figures import BLACK, GREEN, VERMILION
 from experiments.models.regressors import LEVELS, OURS, REGRESSORS, RegressorController, errors, regressor
+from experiments.tasks import in_bullet
 from experiments.tasks.corral import (
     FIRST_DEMONSTRATION,
-    Driving,
-    check_driving,
     drive,
     drive_together,
     driven,
@@ -43,7 +43,7 @@ TEACHER = "teacher"
 
 
 @dataclass
-class Smooth(Driving):
+class Smooth(in_bullet.InBullet):
     """The settings of this study."""
 
     tasks: list[str] = setting(list(TASKS), "whose commands are learned", choices=TASKS, distinct=True)
@@ -55,6 +55,15 @@ class Smooth(Driving):
     demonstrations: int = episodes(20, "episodes of the corral's teacher to learn from")
     starts: int = episodes(48, "held-out starts in the corral")
     blocks: int = setting(3, "blocks of the real data that are held back in turn", low=1, high=FOLDS)
+    bullet_starts: int = episodes(
+        32, "the first of these starts, in the physics engine, too, of all that drive; 0: none", low=0
+    )
+    wheeled_starts: int = episodes(16, "the same on the wheeled body", low=0)
+
+
+def check(settings: Smooth) -> None:
+    """Raise for an engine that is not installed, or does not have the body."""
+    in_bullet.check(settings, CORRAL in settings.tasks)
 
 
 @dataclass(frozen=True)
@@ -74,7 +83,7 @@ def prepare(settings: Smooth, folder: Path, progress: Any) -> Material:
     shown = range(FIRST_DEMONSTRATION, FIRST_DEMONSTRATION + settings.demonstrations)
     train = drive_together(settings, "demonstrations", corral_commands, shown, progress)
     heldout = drive_together(settings, "held-out runs", corral_commands, range(settings.starts), progress)
-    teacher = {"rmse": 0.0, **_counts(heldout)}
+    teacher = {"rmse": 0.0, **_counts(settings, corral_commands, heldout)}
     return Material(settings, moving(train), moving(heldout), teacher)
 
 
@@ -108,7 +117,8 @@ def measure(material: Material, cell: Cell) -> Row:
     model = regressor(cell["model"], dim, cell["levels"], settings.seed)
     row = errors(model, *split(material, cell["task"], cell["fold"]))
     if cell["task"] == CORRAL and dim in (None, max(settings.dims)):
-        row |= _counts(drive(settings, RegressorController(model), range(settings.starts)))
+        controller = RegressorController(model)
+        row |= _counts(settings, controller, drive(settings, controller, range(settings.starts)))
     return row
 
 
@@ -125,19 +135,22 @@ def split(material: Material, task: str, fold: int) -> tuple[Floats, Floats, Flo
     return readings[train_rows], commands[train_rows], readings[test_rows], commands[test_rows]
 
 
-def _counts(rollout: Any) -> Row:
-    return {key: value for key, value in driven(rollout).items() if key != "escapes"}
+def _counts(settings: Smooth, controller: sim.ControllerLike, rollout: sim.Rollout) -> Row:
+    counts = {key: value for key, value in driven(rollout).items() if key != "escapes"}
+    return counts | in_bullet.counted(in_bullet.effects(settings, controller, rollout))
 
 
 def summarise(settings: Smooth, records: pd.DataFrame) -> list[Row]:
     """One row for each task and model: means over the folds; success with Wilson's 95 % interval."""
     keys, means = ["task", "model", "dim", "levels"], ["rmse", "mean_rmse", "relative", "rounding_rmse"]
+    groups: Any = records.groupby(keys, dropna=False)
     records = records.reindex(columns=[*keys, *means, "episodes", "successes"])
     columns = {name: (name, "mean") for name in means} | {"folds": ("task", "count")}
     columns |= {name: (name, "sum") for name in ("episodes", "successes")}
     table = aggregated(records, keys, columns)
     for row in table:
         row |= success(row["episodes"], row.pop("successes"))
+        row |= in_bullet.differences(groups.get_group(tuple(row[key] for key in keys)))
     order = (TEACHER, *REGRESSORS)
     return sorted(
         table,
@@ -206,6 +219,15 @@ TABLE = Table(
         Column("success_rate", "success", ".2f", ("success_low", "success_high"), about="with Wilson's 95 % interval"),
     ],
 )
+
+
+def tables(outcome: Outcome) -> list[Table]:
+    """What was measured, and the same in the physics engine."""
+    about = "All that drive in the corral, from its first starts."
+    keys = [Column("model"), Column("levels")]
+    return [TABLE.show(outcome.table), *in_bullet.tables(keys, outcome.table, about)]
+
+
 METHOD = """
 Commands of two teachers without steps: `corral_commands`, which drives in the corral, and `wall_commands`, which
 answers the real robot's distances in front and to the left and is to be learned from the 24 raw ones. The held-out
@@ -213,8 +235,8 @@ samples are those of unseen starts before the lamp was reached, and blocks in ti
 
 `one_hypervector` is a `BehaviourRegressor`, which interpolates; `levels` are the same codes with a clean-up among the
 commands that were shown, rounded to a number of levels per wheel. nearest_neighbours (5), ridge and mlp (64 hidden) see
-readings in units of the training rows' standard deviation. Models drive in the corral from unseen starts; of the
-program only the largest dimension drives.
+readings in units of the training rows' standard deviation. Models drive in the corral from unseen starts, from the
+first `bullet_starts` and `wheeled_starts` in the physics engine, too; of the program only the largest dimension drives.
 """
 FIGURE = Drawing(
     "smooth",
@@ -227,13 +249,13 @@ study = Study(
     name="smooth",
     about="How close does one hypervector come to wheel commands that take any value?",
     settings=Smooth,
-    check=check_driving,
+    check=check,
     cells=cells,
     prepare=prepare,
     measure=measure,
     summarise=summarise,
     keys=("task", "model", "dim", "levels"),
-    table=TABLE,
+    tables=tables,
     figures=[FIGURE],
     headline=headline,
     method=METHOD,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -48,6 +48,11 @@ def counts(settings: InBullet) -> dict[str, int]:
     if settings.engine == "bullet":
         return {}
     return {body: count for body, name in BODIES.items() if (count := getattr(settings, name))}
+
+
+def twin_starts(settings: Any, twin: str) -> int:
+    """How many of the first starts drive again in the physics engine, for a name of `TWINS`."""
+    return getattr(settings, BODIES[TWINS[twin]])
 
 
 def there(settings: D, body: str) -> D:

@@ -16,7 +16,7 @@ from experiments.composition.measure import distinct
 from experiments.composition.rows import MASKED, ROWS, Shown, line_of
 from experiments.kit.run import check_all, run
 from experiments.models.behaviour_tree import BehaviourTree
-from experiments.tasks import corral
+from experiments.tasks import corral, in_bullet
 from experiments.tasks.asked_once import EachAskedOnce
 from experiments.tasks.behaviours import BEHAVIOURS, Precedence
 from experiments.tasks.in_bullet import TWINS
@@ -169,10 +169,12 @@ def test_flipped_elements_are_counted_in_all_vectors_of_a_row() -> None:
         assert 0 < changed.sum() <= round(0.25 * before.numel())
 
 
-def test_damage_leaves_less(tmp_path: Path) -> None:
+def test_damage_leaves_less(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(in_bullet, "effects", lambda *given: {"planar": [1, 0, -1, 0, 1]})
     settings = composed(
         damage.study, "vsa.dim=512", "demonstrations=6", "heldout=4", "codebooks=2", "seconds=12", "workers=1",
-        "rows=[joint_program,plain_sum]", "flips=[0.1,0.5]", "noise=[0.2]", "starts=6",
+        "rows=[joint_program,plain_sum]", "flips=[0.1,0.5]", "noise=[0.2]", "starts=6", "bullet_rows=[plain_sum]",
+        "bullet_flips=[0]", "bullet_noise=[0.2]",
     )  # fmt: skip
     outcome = run(damage.study, settings, tmp_path, Console(quiet=True))
     found = {(row["row"], row["damage"], row["level"]): row for row in outcome.table}
@@ -187,6 +189,14 @@ def test_damage_leaves_less(tmp_path: Path) -> None:
         )
     assert (tmp_path / "figures" / "damage.png").is_file()
     assert "each row survives flipped elements: `joint_program`" in damage.study.headline(outcome)
+    # In the physics engine what is not damaged is one row; its starts belong to the codebooks in turn.
+    shown = damage.tables(outcome)[1].rows
+    assert [(row["row"], row["damage"], row["level"]) for row in shown] == [
+        ("plain_sum", None, 0.0),
+        ("plain_sum", damage.NOISY, 0.2),
+    ]
+    counts = outcome.records.loc[(outcome.records.row == "plain_sum") & (outcome.records.level == 0.2)]
+    assert counts[["planar_same", "planar_gained", "planar_lost"]].to_numpy().tolist() == [[0, 2, 1], [2, 0, 0]]
 
 
 def test_a_behaviour_tree_is_a_priority() -> None:

@@ -13,7 +13,10 @@ from kits import composed
 from rich.console import Console
 
 import sim
+from experiments.architectures import study as architectures
+from experiments.composition.damage import study as damage
 from experiments.generalisation.corral import study as generalisation
+from experiments.generalisation.smooth import study as smooth
 from experiments.kit.run import check_all, run
 from experiments.observability.study import study as observability
 from experiments.robustness.study import study as robustness
@@ -34,8 +37,27 @@ SMALL = {
         "demonstrations=[1,3]", "draws=[1,1]", "starts=6", "variant_starts=2", "arenas=[default,narrow]",
         "baselines=[]",
     ),
+    "architectures": (
+        "architectures=[MAP-C,VTB]", "dim=400", "encoders=[level]", "records=[product,sum]", "bins=8",
+        "demonstrations=4", "starts=6", "repeats=1",
+    ),
+    "damage": (
+        "vsa.dim=512", "demonstrations=6", "heldout=4", "codebooks=2", "starts=6",
+        "rows=[joint_program,plain_sum]", "bullet_rows=[joint_program]", "flips=[0.1,0.4]", "noise=[]",
+        "bullet_flips=[0,0.4]",
+    ),
+    "smooth": ("models=[one_hypervector]", "dims=[50,200]", "blocks=1", "demonstrations=2", "starts=6"),
 }  # fmt: skip
-STUDIES = {study.name: study for study in (generalisation, observability, robustness)}
+EXPECTED = {
+    "robustness": {"learner": {"default"}},
+    "observability": {"learner": {"default"}},
+    "generalisation": {"learner": {"level/none/product/error_driven"}},
+    "architectures": {"architecture": {"MAP-C", "VTB"}, "encoder": {"product of level"}},
+    "damage": {"row": {"joint_program"}, "level": {0.0, 0.4}},
+    "smooth": {"task": {"corral"}, "model": {"teacher", "one_hypervector"}},
+}
+"""What two rows of each study that drive again have in their columns."""
+STUDIES = {study.name: study for study in (architectures, damage, generalisation, observability, robustness, smooth)}
 
 
 def settings(name: str, *overrides: str) -> Any:
@@ -75,8 +97,8 @@ def test_a_study_drives_a_subset_in_the_physics_engine(name: str, tmp_path: Path
     driven = [row for row in results(tmp_path)["table"] if row.get("planar_starts")]
     assert [row["planar_starts"] for row in driven] == [4, 4]
     assert [row["wheeled_starts"] for row in driven] == [2, 2]
-    expected = "level/none/product/error_driven" if name == "generalisation" else "default"
-    assert {row["learner"] for row in driven} == {expected}
+    for column, values in EXPECTED[name].items():
+        assert {row[column] for row in driven} == values
     records = pq.read_table(only(tmp_path, "records.parquet")).to_pandas()
     rates = records.filter(regex="^(planar|wheeled)_").sum()
     assert rates.filter(like="planar").sum() == 8
