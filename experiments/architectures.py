@@ -124,7 +124,7 @@ def cells(settings: Architectures) -> list[Cell]:
 
 def check(settings: Architectures) -> None:
     """Raise unless there is something to compare, and a robot that can drive."""
-    in_bullet.check(settings, bool(settings.bullet_encoders))
+    in_bullet.check(settings, bool(set(conditions(settings)) & set(settings.bullet_encoders)))
     if not cells(settings):
         raise ValueError(
             f"records={settings.records}: no architecture supports them; "

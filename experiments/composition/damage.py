@@ -71,7 +71,7 @@ def check(settings: Damaged) -> None:
     """Raise for what cannot be learned, and for rows without vectors that can be damaged."""
     space = check_rows(settings, settings.rows)
     corral.arena(settings.arena)
-    in_bullet.check(settings, bool(settings.bullet_rows))
+    in_bullet.check(settings, bool(set(settings.rows) & set(settings.bullet_rows)))
     if space.vsa.dtype == torch.bool or space.vsa.dtype.is_complex:
         raise ValueError(f"damage flips the signs of real numbers, of which {space.vsa.name} has none; try vsa=map_c")
     if not space.encoder.discrete:
