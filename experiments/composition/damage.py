@@ -242,7 +242,10 @@ def tables(outcome: Outcome) -> list[Table]:
     """What was measured; and the same in the physics engine, where what is not damaged at all is one row."""
     once = [row for row in outcome.table if row["level"] or row["damage"] == FLIPPED]
     driven = [row if row["level"] else {**row, "damage": None} for row in once]
-    about = "The first starts of `bullet_rows`, undamaged and with `bullet_flips` and `bullet_noise`, of all codebooks."
+    about = (
+        "The first starts of `bullet_rows`, undamaged and with `bullet_flips` and `bullet_noise`, of all codebooks; "
+        "those of one codebook are taken as independent, so that the intervals are somewhat too narrow."
+    )
     return [TABLE.show(outcome.table), *in_bullet.tables(KEY_COLUMNS, driven, about)]
 
 
