@@ -16,9 +16,9 @@ from torch import Tensor
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
+from behaviours.estimators.base import AT_LEAST_1, QuantileEncoding, Rows
 from behaviours.estimators.files import load_fitted, save_fitted
 from behaviours.learning import Gradient, no_convergence_warnings
-from behaviours.quantiles import AT_LEAST_1, QuantileEncoding, Rows
 from behaviours.report import LearningReport
 from behaviours.schema import Actuator
 from behaviours.space import Space
@@ -29,7 +29,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     """Classify rows of readings `[N, n]` with one hypervector of `dim` numbers.
 
     Each feature is a sensor, binned at the quantiles of its training values. Each dimension of a condition compares a
-    few random sensors (at most `subset`) with random thresholds, and binds the outcomes. The classes are random
+    few random sensors (at most `subset`) with random thresholds, and binds the outcomes; in a share of the dimensions,
+    `oblique`, it compares a weighted sum of three sensors instead (`ObliqueFeatures`). The classes are random
     hypervectors. Only the program is trained, by `Gradient(sparse=True)`: class j scores
     `<condition ⊗ program, class_j>`. NaN means not observed, and is left out; values outside the range of the training
     rows are clipped to it.
@@ -39,17 +40,22 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     | `dim` | elements of the program |
     | `bins` | the most quantile bins per feature; their edges take features · bins floats |
     | `subset` | the most features that interact in one dimension |
+    | `oblique` | the share of weighted sums; None takes 0, 1/4 or 1/2, see below |
     | `epochs`, `batch_size`, `learning_rate` | of the gradient descent |
     | `validation_fraction` | with a share above 0, so many rows are held back, and the best program on them is taken |
     | `patience` | with it, training stops after so many epochs without a better program |
     | `random_state` | the seed of codebooks and batches |
     | `verbose` | 1 prints the progress of the training |
 
+    Boxes suit what depends on single readings, weighted sums what changes gradually in any direction. With
+    `oblique=None` at most 1,000 rows decide: each is predicted by a ridge regression on all others, and the share with
+    the smallest squared error is taken if its error is at least a twentieth below that of boxes alone.
+
     The codebook takes about 17 · `subset` · `dim` bytes, for any number of bins and features. A row with a
     `sample_weight` of 2 counts as two equal rows; the order of the rows does not matter. If `fit` or `partial_fit`
     fails, the estimator is not changed.
 
-    Fitted attributes: `classes_` `[K]`, `behaviour_` (a `Behaviour`, whose `program` is the hypervector),
+    Fitted attributes: `classes_` `[K]`, `oblique_`, `behaviour_` (a `Behaviour`, whose `program` is the hypervector),
     `n_features_in_`.
     """
 
@@ -68,6 +74,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         *,
         bins: int = 4096,
         subset: int = 2,
+        oblique: float | None = None,
         epochs: int = 50,
         batch_size: int = 128,
         learning_rate: float = 0.05,
@@ -79,6 +86,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         self.dim = dim
         self.bins = bins
         self.subset = subset
+        self.oblique = oblique
         self.epochs = epochs
         self.batch_size = batch_size
         self.learning_rate = learning_rate
@@ -106,7 +114,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
                     f"a classifier needs at least 2 classes; the data hold one class, {self.classes_[held[0]]!r}"
                 )
             self.classes_, labels = self.classes_[held], np.searchsorted(held, rows.targets)
-            space = self._class_space(rows)
+            space = self._class_space(rows._replace(targets=labels))
             shown = Demonstrations(torch.tensor(rows.readings), torch.tensor(labels))
             behaviour = self._rule(space.seed).fit(space, shown, self._progress(), torch.from_numpy(rows.weights))
             self.behaviour_ = _counted(behaviour, rows)
@@ -155,7 +163,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
 
     def _class_space(self, rows: Rows) -> Space:
         count = len(self.classes_)
-        return self._space(rows.readings, [Actuator("class", 0, count - 1, levels=count)], rows.weights)
+        wanted = np.eye(count)[rows.targets[:, 0]]
+        return self._space(rows, [Actuator("class", 0, count - 1, levels=count)], wanted)
 
     def _rule(self, seed: int) -> Gradient:
         names = ("epochs", "batch_size", "learning_rate", "validation_fraction", "patience")

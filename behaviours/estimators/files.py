@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 import numpy as np
 from torch import Tensor
 
-from behaviours.quantiles import QuantileEncoding
+from behaviours.estimators.base import QuantileEncoding
+from behaviours.estimators.shares import share_of
 from behaviours.space import Space
 from behaviours.storage import check_layout, error_context, load_tensors, save_tensors
 
@@ -61,6 +62,6 @@ def load_fitted(
             if len(features) != sensors or not all(isinstance(name, str) for name in features):
                 raise ValueError(f"features must be {sensors} names, or null; got {features!r:.200}")
             model.feature_names_in_ = np.array(features, dtype=object)
-        model.n_features_in_ = sensors
+        model.n_features_in_, model.oblique_ = sensors, share_of(space)
         restore(model, space, {name: tensors[name] for name in names}, about)
     return model

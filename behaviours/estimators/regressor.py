@@ -13,11 +13,11 @@ from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted
 from torch import Tensor
 
+from behaviours.estimators.base import QuantileEncoding
 from behaviours.estimators.files import load_fitted, save_fitted
 from behaviours.learning.ridge import check_ridge, chosen_ridge, solve
 from behaviours.options import as_bool
 from behaviours.progress import subrange
-from behaviours.quantiles import QuantileEncoding
 from behaviours.schema import Actuator
 from behaviours.space import Space
 
@@ -35,7 +35,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
     parameters are those of `BehaviourClassifier`, and so is the meaning of `sample_weight`. If `fit` fails, the
     estimator is not changed.
 
-    Fitted attributes: `program_` `[dim]`, `ridge_`, `space_`, `mean_` and `scale_` `[m]`, `n_features_in_`.
+    Fitted attributes: `program_` `[dim]`, `ridge_`, `oblique_`, `space_`, `mean_` and `scale_` `[m]`, `n_features_in_`.
     """
 
     _parameter_constraints: ClassVar[dict[str, Any]] = {
@@ -49,6 +49,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
         *,
         bins: int = 4096,
         subset: int = 2,
+        oblique: float | None = None,
         ridge: float | None = None,
         random_state: Any = None,
         verbose: int = 0,
@@ -56,6 +57,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
         self.dim = dim
         self.bins = bins
         self.subset = subset
+        self.oblique = oblique
         self.ridge = ridge
         self.random_state = random_state
         self.verbose = verbose
@@ -79,7 +81,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
             rows = self._rows(readings, values, sample_weight)
             targets, self.mean_, self.scale_ = _standardised(rows.targets, rows.weights)
             actuators = [Actuator(f"y{i}", -1, 1, levels=2) for i in range(targets.shape[1])]
-            self.space_ = self._space(rows.readings, actuators, rows.weights)
+            self.space_ = self._space(rows, actuators, targets)
             progress = self._progress()
             conditions = torch.cat(self._conditions(self.space_, rows.readings, subrange(progress, 0, 0.5)))
             roles = self.space_.result_encoder.roles

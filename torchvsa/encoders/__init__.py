@@ -3,11 +3,13 @@
 from torchvsa.encoders.balanced import Balanced
 from torchvsa.encoders.base import Binned, Encoder, ValueEncoder
 from torchvsa.encoders.circular import Circular
+from torchvsa.encoders.concatenated import Concatenated
 from torchvsa.encoders.fractional_power import FractionalPower
 from torchvsa.encoders.history import History
 from torchvsa.encoders.level import Level
 from torchvsa.encoders.lookup import Lookup
 from torchvsa.encoders.mirrored import Mirrored
+from torchvsa.encoders.oblique_features import ObliqueFeatures
 from torchvsa.encoders.product import Product
 from torchvsa.encoders.random_fourier import RandomFourier
 from torchvsa.encoders.record import Record
@@ -20,7 +22,17 @@ from torchvsa.part import Part
 
 for part in (Lookup, Level, Balanced, Thermometer, Circular, FractionalPower):
     VALUE_ENCODERS.register(part.name, part)
-for part in (Sum, Product, SubsetProduct, ThresholdFeatures, RandomFourier, History, Mirrored):
+for part in (
+    Sum,
+    Product,
+    SubsetProduct,
+    ThresholdFeatures,
+    ObliqueFeatures,
+    RandomFourier,
+    Concatenated,
+    History,
+    Mirrored,
+):
     ENCODERS.register(part.name, part)
 
 __all__ = [
@@ -29,12 +41,14 @@ __all__ = [
     "Balanced",
     "Binned",
     "Circular",
+    "Concatenated",
     "Encoder",
     "FractionalPower",
     "History",
     "Level",
     "Lookup",
     "Mirrored",
+    "ObliqueFeatures",
     "Part",
     "Product",
     "RandomFourier",

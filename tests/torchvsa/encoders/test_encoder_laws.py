@@ -14,12 +14,14 @@ from torchvsa.encoders import (
     VALUE_ENCODERS,
     Balanced,
     Circular,
+    Concatenated,
     Encoder,
     FractionalPower,
     History,
     Level,
     Lookup,
     Mirrored,
+    ObliqueFeatures,
     Product,
     RandomFourier,
     SubsetProduct,
@@ -29,6 +31,11 @@ from torchvsa.encoders import (
     ValueEncoder,
 )
 from torchvsa.testing import check_encoder, check_value_encoder
+
+
+def _narrow(vsa: VSA, dim: int) -> VSA:
+    return torchvsa.architecture(vsa.name, dim, vsa.config()["dtype"])
+
 
 VALUES: dict[str, Callable[[VSA], ValueEncoder]] = {
     "lookup": lambda vsa: Lookup(vsa, 6),
@@ -43,7 +50,11 @@ ROWS: dict[str, Callable[[VSA], Encoder]] = {
     "product": lambda vsa: Product(Lookup(vsa, 5), 2),
     "subset_product": lambda vsa: SubsetProduct(Level(vsa, 8), 3, 2),
     "threshold_features": lambda vsa: ThresholdFeatures(vsa, 3, 9, 2),
+    "oblique_features": lambda vsa: ObliqueFeatures(vsa, 3, 2),
     "random_fourier": lambda vsa: RandomFourier(vsa, 3),
+    "concatenated": lambda vsa: Concatenated(
+        [Sum(Level(_narrow(vsa, 24), 8), 3), Product(Lookup(_narrow(vsa, vsa.dim - 24), 4), 3)]
+    ),
     "history": lambda vsa: History(Sum(Level(vsa, 8), 2), [1, 3]),
     "mirrored": lambda vsa: Mirrored(Level(vsa, 8), [(0, 2)], 4),
 }
@@ -66,11 +77,17 @@ MORE: dict[str, Callable[[VSA], Encoder]] = {
     "held history": lambda vsa: History(Product(Level(vsa, 8), 2), [1, 2], hold=True),
     "held present": lambda vsa: History(Sum(Lookup(vsa, 4), 2), [], hold=True),
     "history of powers": lambda vsa: History(Sum(FractionalPower(vsa), 2), [2]),
+    "oblique of rows": lambda vsa: ObliqueFeatures(vsa, 2, rows=torch.arange(18).reshape(9, 2) / 20),
+    "boxes beside sums": lambda vsa: Concatenated(
+        [ThresholdFeatures(_narrow(vsa, 30), 2, 9, edges=EDGES), ObliqueFeatures(_narrow(vsa, vsa.dim - 30), 2)]
+    ),
+    "history of sums": lambda vsa: History(ObliqueFeatures(vsa, 2), [1]),
     "history of edges": lambda vsa: History(ThresholdFeatures(vsa, 2, 9, edges=EDGES), [1]),
 }
 POWERS = ("fractional_power", "mirrored powers", "product of powers", "sum of powers and bins", "history of powers")
 NEGATIVES = (
     *("balanced", "thermometer", "circular", "threshold_features", "sum of mixed bins", "edges", "kinds"),
+    *("oblique_features", "oblique of rows", "history of sums"),
     *("kinds and edges", "history of kinds", "history of edges"),
 )
 NEEDS: dict[str, Callable[[VSA], bool]] = {
@@ -79,6 +96,8 @@ NEEDS: dict[str, Callable[[VSA], bool]] = {
     **dict.fromkeys(NEGATIVES, lambda vsa: vsa.negatable),
     **dict.fromkeys(POWERS, lambda vsa: vsa.frequencies is not None),
     "mirrored powers": lambda vsa: vsa.elementwise and vsa.frequencies is not None and vsa.dim % 2 == 0,
+    "concatenated": lambda vsa: vsa.elementwise,
+    "boxes beside sums": lambda vsa: vsa.elementwise and vsa.negatable,
     "random_fourier": lambda vsa: vsa.elementwise and not vsa.dtype.is_complex and vsa.dtype != torch.bool,
     "waves": lambda vsa: vsa.elementwise and vsa.dtype.is_floating_point,
 }

@@ -4,7 +4,7 @@ import math
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from numbers import Integral
+from numbers import Integral, Real
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
@@ -20,13 +20,14 @@ from sklearn.utils.validation import (
 from torch import Tensor
 
 from behaviours.edges import quantile_edges
+from behaviours.estimators.shares import chosen_space, encoder
 from behaviours.options import as_int
 from behaviours.progress import Progress, in_steps, no_progress
 from behaviours.schema import Actuator, Schema, Sensor
 from behaviours.space import Space
 from torchvsa import MAP
 from torchvsa._memory_limit import require_memory
-from torchvsa.encoders import Balanced, ThresholdFeatures
+from torchvsa.encoders import Balanced
 
 _ROWS = 1024
 """Rows encoded in one call; bounds the memory."""
@@ -55,16 +56,19 @@ class QuantileEncoding(BaseEstimator):
         "dim": AT_LEAST_1,
         "bins": AT_LEAST_1,
         "subset": AT_LEAST_1,
+        "oblique": [Interval(Real, 0, 1, closed="both"), None],
         "random_state": ["random_state"],
         "verbose": ["verbose"],
     }
     dim: int
     bins: int
     subset: int
+    oblique: float | None
     random_state: Any
     verbose: int
     n_features_in_: int
     feature_names_in_: np.ndarray
+    oblique_: float
 
     def __sklearn_tags__(self) -> Any:
         tags = super().__sklearn_tags__()
@@ -121,11 +125,12 @@ class QuantileEncoding(BaseEstimator):
         _, first, index = np.unique(keys, return_index=True, return_inverse=True)
         return Rows(readings[first], targets[first], np.bincount(index, weights), len(weights))
 
-    def _space(
-        self, readings: Float64[np.ndarray, "N n"], actuators: list[Actuator], weights: Float64[np.ndarray, "N"]
-    ) -> Space:
-        """A space for these readings; the bin edges depend on readings and weights alone."""
-        bins, features = self._whole("bins"), readings.shape[1]
+    def _space(self, rows: Rows, actuators: list[Actuator], wanted: Float64[np.ndarray, "N m"]) -> Space:
+        """A space for these rows, and `oblique_`; `wanted` decides nothing but the share of weighted sums.
+
+        The bin edges depend on readings and weights alone.
+        """
+        bins, features = self._whole("bins"), rows.readings.shape[1]
         require_memory(
             _EDGE_BYTES * bins * features,
             f"{type(self).__name__}: the edges of bins={bins:,} for each of {features} features",
@@ -133,18 +138,28 @@ class QuantileEncoding(BaseEstimator):
         )
         seed = int(check_random_state(self.random_state).randint(2**31 - 1))
         names = getattr(self, "feature_names_in_", [f"x{i}" for i in range(features)])
-        sensors, edges = [], []
-        for name, column in zip(names, torch.tensor(readings).T, strict=True):
+        sensors, edges, weights = [], [], torch.from_numpy(rows.weights)
+        for name, column in zip(names, torch.tensor(rows.readings).T, strict=True):
             seen = ~column.isnan()
             observed = column[seen]
             low, high = (observed.min().item(), observed.max().item()) if len(observed) else (0.0, 0.0)
             low, high = (low, high) if low < high else _around(low)
             sensors.append(Sensor(str(name), low, high, out_of_range="clip"))
-            edges.append((quantile_edges(observed, bins, torch.from_numpy(weights)[seen]) - low) / (high - low))
+            edges.append((quantile_edges(observed, bins, weights[seen]) - low) / (high - low))
         vsa = MAP(self._whole("dim"), dtype=torch.int8)
-        encoder = ThresholdFeatures(vsa, features, bins, self._whole("subset"), edges)
         codes = Balanced(vsa, max(actuator.levels for actuator in actuators))
-        return Space(Schema(sensors, actuators), encoder, seed=seed, command_codes=codes)
+        schema = Schema(sensors, actuators)
+        readings = torch.from_numpy(rows.readings)
+
+        def of(share: float) -> Space:
+            made = encoder(vsa, share, schema.normalise(readings), bins, self._whole("subset"), edges)
+            return Space(schema, made, seed=seed, command_codes=codes)
+
+        if self.oblique is not None:
+            self.oblique_ = float(self.oblique)
+            return of(self.oblique_)
+        self.oblique_, space = chosen_space(of, readings, torch.from_numpy(wanted), weights)
+        return space
 
     def _conditions(
         self, space: Space, readings: Float64[np.ndarray, "N n"], progress: Progress = no_progress

@@ -1,0 +1,68 @@
+"""Boxes and weighted sums side by side, and the share of the dimensions that is of each kind."""
+
+from collections.abc import Callable, Sequence
+
+import torch
+from jaxtyping import Float64
+from torch import Tensor
+
+from behaviours.learning.leave_one_out import leave_one_out_error
+from behaviours.space import Space
+from torchvsa import MAP
+from torchvsa.encoders import Concatenated, Encoder, ObliqueFeatures, ThresholdFeatures
+
+SHARES = (0.0, 0.25, 0.5)
+"""The shares of weighted sums that `chosen_space` compares."""
+_MOST = 1000
+"""So many rows decide, and so many examples place the weighted sums."""
+_FEW = 20
+"""Fewer rows do not tell the shares apart."""
+_GAIN = 0.05
+"""The share of the error of boxes alone by which weighted sums must be better."""
+
+
+def encoder(
+    vsa: MAP, share: float, x: Float64[Tensor, "N n"], bins: int, subset: int, edges: Sequence[Float64[Tensor, "_"]]
+) -> Encoder:
+    """A plan of an encoder with this share of weighted sums of the readings `x` in [0, 1]; the rest are boxes."""
+    features, oblique = x.shape[1], round(share * vsa.dim)
+    kinds: list[Encoder] = []
+    if oblique < vsa.dim:
+        kinds.append(ThresholdFeatures(MAP(vsa.dim - oblique, dtype=vsa.dtype), features, bins, subset, edges))
+    if oblique:
+        kinds.append(ObliqueFeatures(MAP(oblique, dtype=vsa.dtype), features, rows=x[_some(len(x))]))
+    return kinds[0] if len(kinds) == 1 else Concatenated(kinds)
+
+
+def share_of(space: Space) -> float:
+    """The share of weighted sums in a space with such an encoder."""
+    parts = [part for part in space.encoder.modules() if isinstance(part, ObliqueFeatures)]
+    return sum(part.vsa.dim for part in parts) / space.vsa.dim
+
+
+def chosen_space(
+    of: Callable[[float], Space],
+    readings: Float64[Tensor, "N n"],
+    wanted: Float64[Tensor, "N m"],
+    weights: Float64[Tensor, "N"],
+) -> tuple[float, Space]:
+    """The one of `SHARES` that predicts rows best from all other rows, and its space.
+
+    Boxes alone are kept unless the error is smaller by a twentieth. At most 1,000 rows take part.
+    """
+    if len(readings) < _FEW:
+        return 0.0, of(0.0)
+    chosen = _some(len(readings))
+    spaces, errors = {share: of(share) for share in SHARES}, {}
+    for share, space in spaces.items():
+        conditions = space.encode(space.cells(readings[chosen]))
+        errors[share] = leave_one_out_error(conditions, wanted[chosen], weights[chosen])
+    best = min(SHARES, key=errors.__getitem__)
+    if errors[best] > (1 - _GAIN) * errors[0.0]:
+        best = 0.0
+    return best, spaces[best]
+
+
+def _some(count: int) -> Tensor:
+    """Up to `_MOST` rows, drawn at random."""
+    return torch.randperm(count, generator=torch.Generator().manual_seed(0))[:_MOST]
