@@ -106,7 +106,10 @@ CHANGES: dict[str, tuple[Callable[[Any, Any], object], str]] = {
     "other parameter": (lambda _, about: _set(about, "parameters", "dimension", value=1), "parameters: .*dimension"),
     "names": (lambda _, about: _set(about, "features", value=["one"]), "features must be 3 names"),
     "program": (lambda tensors, _: tensors.update(program=tensors["program"][:9].clone()), "program must be one"),
-    "codebook": (lambda tensors, _: tensors.pop("space.result_encoder.roles"), "'space.result_encoder.roles' is missing"),
+    "codebook": (
+        lambda tensors, _: tensors.pop("space.result_encoder.roles"),
+        "'space.result_encoder.roles' is missing",
+    ),
     "more": (lambda tensors, _: tensors.update(more=tensors["program"].clone()), "'more' is unexpected"),
     "nothing": (lambda tensors, _: tensors.pop("known"), "'known' is missing"),
 }

@@ -21,6 +21,7 @@ from torchvsa.encoders import (
     History,
     Level,
     Lookup,
+    ObliqueFeatures,
     Product,
     RandomFourier,
     Sum,
@@ -183,6 +184,7 @@ FITTING: dict[str, Encoder] = {
     "all real": ThresholdFeatures(VSA, 4, 16),
     "a memory": History(ThresholdFeatures(VSA, 4, 16, kinds=["real", 2, 3, "angle"]), [1, 2]),
     "waves": RandomFourier(MAP(64), 4),
+    "sums": ObliqueFeatures(MAP(64), 4),
     "a line of categories": Product([EACH[0], EACH[1], Level(VSA, 3), EACH[0]]),
 }
 

@@ -37,6 +37,7 @@ HOSTILE: list[Any] = [
     ),
     *("MAP-I", "HRR", "BSC", "FHRR", "int8", "float16", "bfloat16", "float64", "complex64", "bool", "load", "C", "B"),
     *("product", "sum", "subset_product", "threshold_features", "history", "level", "lookup", "balanced"),
+    *("oblique_features", "concatenated"),
     *("self_shift", "fixed_shift", "none"),
     *({"name": "none"}, "mean", "sum", "clip", "error", "random_fourier", "circular", "uniform", "bipolar"),
 ]

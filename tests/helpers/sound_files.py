@@ -14,11 +14,13 @@ from torchvsa import BSC, FHRR, HRR, MAP, VSA, FixedShift, Protection, SelfShift
 from torchvsa.encoders import (
     Balanced,
     Circular,
+    Concatenated,
     Encoder,
     FractionalPower,
     History,
     Level,
     Lookup,
+    ObliqueFeatures,
     Product,
     RandomFourier,
     SubsetProduct,
@@ -44,6 +46,12 @@ def _bank(make: Callable[[VSA], Encoder], vsa: VSA, protection: Protection | Non
     bank.learn("forward . é", Demonstrations(readings[12:], commands[12:]), OneShot())
     bank.add("both", bank["steer"] - 2 * bank["forward . é"])
     return bank
+
+
+def _side_by_side(vsa: VSA) -> Encoder:
+    boxes, sums = (MAP(dim, dtype=vsa.dtype) for dim in (20, vsa.dim - 20))
+    rows = torch.tensor([[0.1, 0.2], [0.9, 0.4], [0.5, 0.8]])
+    return Concatenated([ThresholdFeatures(boxes, 2, 9, 2, _EDGES), ObliqueFeatures(sums, 2, rows=rows)])
 
 
 def _mixed() -> BehaviourBank:
@@ -74,6 +82,7 @@ def originals() -> list[tuple[str, bytes]]:
         _bank(lambda vsa: History(Sum(Thermometer(vsa, 4), 2), [1]), MAP(32, "I", torch.int8)),
         _bank(lambda vsa: Sum(FractionalPower(vsa), 2), fhrr),
         _bank(lambda vsa: RandomFourier(vsa, 2), floats),
+        _bank(_side_by_side, exact),
         _mixed(),
     ]
     shown = Demonstrations([[0.1, math.nan], [0.2, 0.3], [0.5, 0.6]], [[0.0], [1.0], [0.5]], [0, 0, 1])

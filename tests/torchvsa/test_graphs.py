@@ -12,11 +12,13 @@ from torch.func import functional_call, vmap
 from torchvsa import ARCHITECTURES, PROTECTIONS, VSA, SelfShift, architecture, architecture_near
 from torchvsa.encoders import (
     Circular,
+    Concatenated,
     Encoder,
     FractionalPower,
     History,
     Level,
     Lookup,
+    ObliqueFeatures,
     Product,
     RandomFourier,
     SubsetProduct,
@@ -65,7 +67,9 @@ def encoders(vsa: VSA) -> list[Encoder]:
         mixed: list[ValueEncoder] = [FractionalPower(vsa), Level(vsa, 5), FractionalPower(vsa, kernel="sinc")]
         made += [Sum(FractionalPower(vsa), 3), Product(mixed)]
     if "MAP" in vsa.name:
-        made.append(RandomFourier(vsa, 3))
+        sums = ObliqueFeatures(architecture(vsa.name, vsa.dim - 24, str(vsa.dtype).removeprefix("torch.")), 3)
+        boxes = ThresholdFeatures(architecture(vsa.name, 24, str(vsa.dtype).removeprefix("torch.")), 3, edges=edges)
+        made += [RandomFourier(vsa, 3), Concatenated([boxes, sums])]
     return [encode if encode.drawn else encode.draw(generator()) for encode in made]
 
 

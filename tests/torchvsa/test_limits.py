@@ -15,6 +15,7 @@ from torchvsa.encoders import (
     FractionalPower,
     Level,
     Lookup,
+    ObliqueFeatures,
     Product,
     RandomFourier,
     SubsetProduct,
@@ -84,6 +85,7 @@ TOO_LARGE: dict[str, Callable[[], object]] = {
     "thresholds of many sensors": lambda: ThresholdFeatures(MAP(1000), HUGE, 2, seed=0),
     "thresholds of many dimensions": lambda: ThresholdFeatures(MAP(HUGE), 2, 2, seed=0),
     "angles of many dimensions": lambda: FractionalPower(FHRR(HUGE), seed=0),
+    "weighted sums of many sensors": lambda: ObliqueFeatures(MAP(1000), HUGE, seed=0),
     "random features of many sensors": lambda: RandomFourier(MAP(1000), HUGE, seed=0),
 }
 
