@@ -67,8 +67,8 @@ def encoders(vsa: VSA) -> list[Encoder]:
         mixed: list[ValueEncoder] = [FractionalPower(vsa), Level(vsa, 5), FractionalPower(vsa, kernel="sinc")]
         made += [Sum(FractionalPower(vsa), 3), Product(mixed)]
     if "MAP" in vsa.name:
-        sums = ObliqueFeatures(architecture(vsa.name, vsa.dim - 24, str(vsa.dtype).removeprefix("torch.")), 3)
-        boxes = ThresholdFeatures(architecture(vsa.name, 24, str(vsa.dtype).removeprefix("torch.")), 3, edges=edges)
+        sums = ObliqueFeatures(architecture(vsa.name, vsa.dim - 24, vsa.dtype), 3)
+        boxes = ThresholdFeatures(architecture(vsa.name, 24, vsa.dtype), 3, edges=edges)
         made += [RandomFourier(vsa, 3), Concatenated([boxes, sums])]
     return [encode if encode.drawn else encode.draw(generator()) for encode in made]
 

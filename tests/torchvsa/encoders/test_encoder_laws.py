@@ -34,7 +34,7 @@ from torchvsa.testing import check_encoder, check_value_encoder
 
 
 def _narrow(vsa: VSA, dim: int) -> VSA:
-    return torchvsa.architecture(vsa.name, dim, vsa.config()["dtype"])
+    return torchvsa.architecture(vsa.name, dim, vsa.dtype)
 
 
 VALUES: dict[str, Callable[[VSA], ValueEncoder]] = {
