@@ -196,7 +196,7 @@ def test_a_classifier_in_onnxruntime(tmp_path: Path) -> None:
     X = rng.normal(size=(300, 3))  # noqa: N806
     X[::11, 1] = np.nan
     y = np.array(["stop", "left", "right"])[(X[:, 0] > 0).astype(int) + (X[:, 2] > 0.5)]
-    model = BehaviourClassifier(dim=500, bins=64, epochs=20, random_state=0).fit(X, y)
+    model = BehaviourClassifier(dim=500, bins=64, oblique=0, epochs=20, random_state=0).fit(X, y)
     path = to_onnx(model, tmp_path / "classes.onnx")
     meta = onnxruntime.InferenceSession(path).get_modelmeta().custom_metadata_map
     assert json.loads(meta["labels"]) == {json.loads(meta["actuators"])[0]: ["left", "right", "stop"]}
@@ -209,6 +209,9 @@ def test_a_classifier_in_onnxruntime(tmp_path: Path) -> None:
     edge = sensor.low + float(features.edges[0, 7]) * (sensor.high - sensor.low)
     odd = np.array([[99.0, -99, 0], [edge, 0, 0]])
     np.testing.assert_array_equal(answers(path, odd)[0].numpy(), model.behaviour_(odd).commands.numpy())
+    mixed = BehaviourClassifier(dim=500, oblique=0.5, epochs=20, random_state=0).fit(X, y)
+    found = answers(to_onnx(mixed, tmp_path / "sums.onnx"), X)[0][:, 0].numpy().astype(int)
+    np.testing.assert_array_equal(mixed.classes_[found], mixed.predict(X))
 
 
 @pytest.mark.slow

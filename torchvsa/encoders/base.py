@@ -166,7 +166,11 @@ def binned(x: Float[Tensor, "*batch"], bins: int | Int64[Tensor, "n"]) -> Int64[
 
 def continuous(x: Float[Tensor, "*batch"]) -> Float[Tensor, "*batch"]:
     """The values, clamped to [0, 1], and -1 for NaN."""
-    return torch.where(x.isnan(), float(UNOBSERVED), x.clamp(0, 1))
+    within = x.clamp(0, 1)
+    if torch.compiler.is_exporting():
+        # The optimiser of ONNX graphs joins two clamps of one tensor, as of encoders side by side, to an invalid graph.
+        within = torch.where(x > 1, 1.0, torch.where(x < 0, 0.0, x))
+    return torch.where(x.isnan(), float(UNOBSERVED), within)
 
 
 def check_range(x: Float[Tensor, "*batch"]) -> None:
