@@ -20,7 +20,7 @@ from sklearn.utils.validation import (
 from torch import Tensor
 
 from behaviours.edges import quantile_edges
-from behaviours.estimators.shares import chosen_space, encoder
+from behaviours.estimators.shares import chosen_space, encoder, share_of, some
 from behaviours.options import as_int
 from behaviours.progress import Progress, in_steps, no_progress
 from behaviours.schema import Actuator, Schema, Sensor
@@ -150,15 +150,17 @@ class QuantileEncoding(BaseEstimator):
         codes = Balanced(vsa, max(actuator.levels for actuator in actuators))
         schema = Schema(sensors, actuators)
         readings = torch.from_numpy(rows.readings)
+        examples = schema.normalise(readings[some(len(readings))])
 
         def of(share: float) -> Space:
-            made = encoder(vsa, share, schema.normalise(readings), bins, self._whole("subset"), edges)
+            made = encoder(vsa, share, examples, bins, self._whole("subset"), edges)
             return Space(schema, made, seed=seed, command_codes=codes)
 
-        if self.oblique is not None:
-            self.oblique_ = float(self.oblique)
-            return of(self.oblique_)
-        self.oblique_, space = chosen_space(of, readings, torch.from_numpy(wanted), weights)
+        if self.oblique is None:
+            space = chosen_space(of, readings, torch.from_numpy(wanted), weights)
+        else:
+            space = of(self.oblique)
+        self.oblique_ = share_of(space)
         return space
 
     def _conditions(

@@ -22,15 +22,20 @@ _GAIN = 0.05
 
 
 def encoder(
-    vsa: MAP, share: float, x: Float64[Tensor, "N n"], bins: int, subset: int, edges: Sequence[Float64[Tensor, "_"]]
+    vsa: MAP,
+    share: float,
+    examples: Float64[Tensor, "k n"],
+    bins: int,
+    subset: int,
+    edges: Sequence[Float64[Tensor, "_"]],
 ) -> Encoder:
-    """A plan of an encoder with this share of weighted sums of the readings `x` in [0, 1]; the rest are boxes."""
-    features, oblique = x.shape[1], round(share * vsa.dim)
+    """A plan of an encoder with this share of weighted sums, placed by examples in [0, 1]; the rest are boxes."""
+    features, oblique = examples.shape[1], round(share * vsa.dim)
     kinds: list[Encoder] = []
     if oblique < vsa.dim:
         kinds.append(ThresholdFeatures(MAP(vsa.dim - oblique, dtype=vsa.dtype), features, bins, subset, edges))
     if oblique:
-        kinds.append(ObliqueFeatures(MAP(oblique, dtype=vsa.dtype), features, rows=x[_some(len(x))]))
+        kinds.append(ObliqueFeatures(MAP(oblique, dtype=vsa.dtype), features, rows=examples))
     return kinds[0] if len(kinds) == 1 else Concatenated(kinds)
 
 
@@ -45,24 +50,22 @@ def chosen_space(
     readings: Float64[Tensor, "N n"],
     wanted: Float64[Tensor, "N m"],
     weights: Float64[Tensor, "N"],
-) -> tuple[float, Space]:
-    """The one of `SHARES` that predicts rows best from all other rows, and its space.
+) -> Space:
+    """The space with the one of `SHARES` that predicts rows best from all other rows.
 
     Boxes alone are kept unless the error is smaller by a twentieth. At most 1,000 rows take part.
     """
     if len(readings) < _FEW:
-        return 0.0, of(0.0)
-    chosen = _some(len(readings))
+        return of(0.0)
+    chosen = some(len(readings))
     spaces, errors = {share: of(share) for share in SHARES}, {}
     for share, space in spaces.items():
         conditions = space.encode(space.cells(readings[chosen]))
         errors[share] = leave_one_out_error(conditions, wanted[chosen], weights[chosen])
     best = min(SHARES, key=errors.__getitem__)
-    if errors[best] > (1 - _GAIN) * errors[0.0]:
-        best = 0.0
-    return best, spaces[best]
+    return spaces[best if errors[best] <= (1 - _GAIN) * errors[0.0] else 0.0]
 
 
-def _some(count: int) -> Tensor:
+def some(count: int) -> Tensor:
     """Up to `_MOST` rows, drawn at random."""
     return torch.randperm(count, generator=torch.Generator().manual_seed(0))[:_MOST]
