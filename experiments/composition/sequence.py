@@ -149,8 +149,9 @@ def summarise(settings: Sequence, records: pd.DataFrame) -> list[Row]:
         for name, own in rows.items():
             row = {**cell, "row": name, **corral.success(len(own), int(own.success.sum()))}
             if cell["engine"] != "vector":
+                driver = TEACHER if name == TEACHER else VECTOR
                 before = records.loc[
-                    (records.arena == cell["arena"]) & (records.engine == "vector") & (records.row == own.row.iloc[0])
+                    (records.arena == cell["arena"]) & (records.engine == "vector") & (records.row == driver)
                 ].set_index("episode")
                 row |= mean("minus_vector", own.success.astype(float) - before.success.loc[own.index].astype(float))
             if name == VECTOR and cell["engine"] == "vector":

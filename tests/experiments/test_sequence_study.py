@@ -86,3 +86,14 @@ def test_the_room_has_the_two_lamps_and_no_gap() -> None:
 def test_what_cannot_work_is_refused(override: str, words: str) -> None:
     with pytest.raises(ValueError, match=words):
         check_all(study, composed(study, override))
+
+
+def test_a_teacher_that_solves_no_start_leaves_an_empty_row() -> None:
+    settings = composed(study, "arenas=[lamp_room]", "workers=1")
+    keys = {"arena": "lamp_room", "episode": 0, "success": False, "codebook": 0, "agreement": None}
+    rows = [
+        {**keys, "engine": engine, "row": row} for engine in ("vector", "bullet") for row in ("teacher", "one_vector")
+    ]
+    table = {(row["engine"], row["row"]): row for row in study.summarise(settings, pd.DataFrame(rows))}
+    assert table["bullet", "one_vector_common"]["episodes"] == 0
+    assert table["bullet", "one_vector"]["minus_vector"] == 0
