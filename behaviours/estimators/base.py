@@ -2,14 +2,14 @@
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from numbers import Integral, Real
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 import torch
-from jaxtyping import Float64, Shaped
+from jaxtyping import Float64, Int64, Shaped
 from sklearn.base import BaseEstimator
 from sklearn.utils import check_random_state
 from sklearn.utils._param_validation import Interval
@@ -125,10 +125,13 @@ class QuantileEncoding(BaseEstimator):
         _, first, index = np.unique(keys, return_index=True, return_inverse=True)
         return Rows(readings[first], targets[first], np.bincount(index, weights), len(weights))
 
-    def _space(self, rows: Rows, actuators: list[Actuator], wanted: Float64[np.ndarray, "N m"]) -> Space:
-        """A space for these rows, and `oblique_`; `wanted` decides nothing but the share of weighted sums.
+    def _space(
+        self, rows: Rows, actuators: list[Actuator], wanted: Callable[[Int64[Tensor, "k"]], Float64[Tensor, "k m"]]
+    ) -> Space:
+        """A space for these rows, and `oblique_`.
 
-        The bin edges depend on readings and weights alone.
+        `wanted` gives the targets of some rows, which decide nothing but the share of weighted sums; the bin edges
+        depend on readings and weights alone.
         """
         bins, features = self._whole("bins"), rows.readings.shape[1]
         require_memory(
@@ -149,15 +152,16 @@ class QuantileEncoding(BaseEstimator):
         vsa = MAP(self._whole("dim"), dtype=torch.int8)
         codes = Balanced(vsa, max(actuator.levels for actuator in actuators))
         schema = Schema(sensors, actuators)
-        readings = torch.from_numpy(rows.readings)
-        examples = schema.normalise(readings[some(len(readings))])
+        chosen = some(len(rows.readings))
+        readings = torch.from_numpy(rows.readings)[chosen]
+        examples = schema.normalise(readings)
 
         def of(share: float) -> Space:
             made = encoder(vsa, share, examples, bins, self._whole("subset"), edges)
             return Space(schema, made, seed=seed, command_codes=codes)
 
         if self.oblique is None:
-            space = chosen_space(of, readings, torch.from_numpy(wanted), weights)
+            space = chosen_space(of, readings, wanted(chosen), weights[chosen])
         else:
             space = of(self.oblique)
         self.oblique_ = share_of(space)

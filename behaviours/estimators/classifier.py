@@ -13,6 +13,7 @@ from sklearn.utils._param_validation import Interval
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 from torch import Tensor
+from torch.nn.functional import one_hot
 
 from behaviours.behaviour import Behaviour
 from behaviours.demonstrations import Demonstrations
@@ -163,8 +164,9 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
 
     def _class_space(self, rows: Rows) -> Space:
         count = len(self.classes_)
-        wanted = np.eye(count)[rows.targets[:, 0]]
-        return self._space(rows, [Actuator("class", 0, count - 1, levels=count)], wanted)
+        labels = torch.from_numpy(rows.targets)[:, 0]
+        actuators = [Actuator("class", 0, count - 1, levels=count)]
+        return self._space(rows, actuators, lambda chosen: one_hot(labels[chosen], count).double())
 
     def _rule(self, seed: int) -> Gradient:
         names = ("epochs", "batch_size", "learning_rate", "validation_fraction", "patience")

@@ -81,7 +81,7 @@ class BehaviourRegressor(RegressorMixin, QuantileEncoding):
             rows = self._rows(readings, values, sample_weight)
             targets, self.mean_, self.scale_ = _standardised(rows.targets, rows.weights)
             actuators = [Actuator(f"y{i}", -1, 1, levels=2) for i in range(targets.shape[1])]
-            self.space_ = self._space(rows, actuators, targets)
+            self.space_ = self._space(rows, actuators, lambda chosen: torch.from_numpy(targets)[chosen])
             progress = self._progress()
             conditions = torch.cat(self._conditions(self.space_, rows.readings, subrange(progress, 0, 0.5)))
             roles = self.space_.result_encoder.roles

@@ -1,4 +1,4 @@
-"""How well readings tell targets: the error of a ridge regression on each row, learned from all others."""
+"""The error of a ridge regression on each row, learned from all others."""
 
 import torch
 from jaxtyping import Float64, Shaped
