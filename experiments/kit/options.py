@@ -60,7 +60,7 @@ GROUPS: dict[str, Group] = {
     "encoder": Group(VALUE_ENCODERS, frozenset({"vsa"}), {"bins": 32}),
     "record": Group(
         ENCODERS,
-        frozenset({"vsa", "values", "sensors", "edges", "kinds", "bins"}),
+        frozenset({"vsa", "values", "sensors", "edges", "kinds", "bins", "rows"}),
         # What mirrors needs to be told which sensors swap.
         only=lambda part: takes(part, "values", "vsa") and not takes(part, "pairs"),
     ),

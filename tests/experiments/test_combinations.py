@@ -25,7 +25,7 @@ def unsupported(rule: str, vsa: VSA, record: str) -> bool:
     return (
         (rule in ("least_squares", "evident") and not real)
         or (record == "subset_product" and not vsa.elementwise)
-        or (record == "threshold_features" and not vsa.negatable)
+        or (record in ("threshold_features", "oblique_features") and not vsa.negatable)
         or (record == "random_fourier" and not (real and vsa.dtype != torch.bool))
     )
 

@@ -19,7 +19,7 @@ from experiments.kit.run import check_all
 from experiments.tasks import corral
 
 GROUPS = ("vsa", "encoder", "record", "protection", "rule", "composition", "arena")
-CONTINUOUS = ("encoder=fractional_power", "record=random_fourier")
+CONTINUOUS = ("encoder=fractional_power", "record=random_fourier", "record=oblique_features")
 
 
 def settings(*overrides: str) -> Corral:
