@@ -1,6 +1,8 @@
 """The share of weighted sums among the dimensions of an estimator."""
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -40,8 +42,8 @@ def striped() -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("make", [diagonal, striped])
-def test_the_share_follows_the_data(make: object) -> None:
-    X, y = make()  # type: ignore[operator] # noqa: N806
+def test_the_share_follows_the_data(make: Callable[[], tuple[np.ndarray, np.ndarray]]) -> None:
+    X, y = make()  # noqa: N806
     model = BehaviourRegressor(dim=1000, random_state=0).fit(X[:400], y[:400])
     assert (model.oblique_ > 0) == (make is diagonal)
     scores = {
@@ -77,7 +79,7 @@ def test_neither_order_nor_copies_of_rows_change_the_choice() -> None:
 
 
 @pytest.mark.parametrize("wrong", [-0.1, 1.5, "half", np.nan])
-def test_another_share_is_refused(wrong: object) -> None:
+def test_another_share_is_refused(wrong: Any) -> None:
     X, y = diagonal()  # noqa: N806
     with pytest.raises(ValueError, match="'oblique' parameter of BehaviourRegressor must be"):
-        BehaviourRegressor(oblique=wrong).fit(X, y)  # type: ignore[arg-type]
+        BehaviourRegressor(oblique=wrong).fit(X, y)

@@ -5,7 +5,7 @@ from abc import abstractmethod
 from typing import Any, ClassVar, TypeVar
 
 import torch
-from jaxtyping import Float, Int64, Shaped
+from jaxtyping import Bool, Float, Int64, Shaped
 from torch import Tensor
 
 from torchvsa._checks import readable, whole_number
@@ -182,6 +182,13 @@ def check_range(x: Float[Tensor, "*batch"]) -> None:
         f"encoders take readings in [0, 1], NaN for unobserved; got {x[tuple(position)].item():g} at {position} "
         "(Schema.normalise scales readings of any range)"
     )
+
+
+def negated_where(vsa: VSA, codes: Shaped[Tensor, "d"], where: Bool[Tensor, "batch d"]) -> Shaped[Tensor, "batch d"]:
+    """A row of codes for each row of `where`, with the elements negated that it marks."""
+    if codes.dtype == torch.bool:
+        return codes ^ where
+    return torch.where(where, vsa.negative(codes), codes)
 
 
 def planned(part: P) -> P:

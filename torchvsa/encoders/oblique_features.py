@@ -8,7 +8,7 @@ from torch import Tensor
 
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
-from torchvsa.encoders.base import Encoder, continuous, require_negatable, whole
+from torchvsa.encoders.base import Encoder, continuous, negated_where, require_negatable, whole
 from torchvsa.part import Layout
 
 
@@ -107,9 +107,7 @@ class ObliqueFeatures(Encoder):
         assert total is not None
         assert blind is not None
         negated = ((total > self.threshold[:, None]) & ~blind).T.contiguous()
-        if self.start_codes.dtype == torch.bool:
-            return self.start_codes ^ negated
-        return torch.where(negated, self.vsa.negative(self.start_codes), self.start_codes)
+        return negated_where(self.vsa, self.start_codes, negated)
 
     def _draw(self, generator: torch.Generator | None) -> dict[str, Tensor]:
         dim, sensors, most = self.vsa.dim, self.sensors, min(self.subset, self.sensors)

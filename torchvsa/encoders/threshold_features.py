@@ -10,7 +10,7 @@ from torch import Tensor
 from torchvsa._checks import whole_number
 from torchvsa._memory_limit import require_memory
 from torchvsa.architectures import VSA
-from torchvsa.encoders.base import Encoder, binned, require_negatable, whole
+from torchvsa.encoders.base import Encoder, binned, negated_where, require_negatable, whole
 from torchvsa.part import Layout
 
 _CONSTANT = 1 / 16
@@ -166,9 +166,7 @@ class ThresholdFeatures(Encoder):
         assert against is not None
         assert blind is not None
         negated = ~(against | blind).T.contiguous()
-        if self.start_codes.dtype == torch.bool:
-            return self.start_codes ^ negated
-        return torch.where(negated, self.vsa.negative(self.start_codes), self.start_codes)
+        return negated_where(self.vsa, self.start_codes, negated)
 
     def _side(self, place: int, cells: Int64[Tensor, "d batch"]) -> Bool[Tensor, "d batch"]:
         """The result of the comparison number `place` of each dimension, before `above` selects a side."""

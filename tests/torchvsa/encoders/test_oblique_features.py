@@ -1,6 +1,8 @@
 """Weighted sums against thresholds, alone and beside other encoders."""
 
 import math
+import re
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -89,14 +91,13 @@ def test_codes_of_several_encoders_are_side_by_side() -> None:
         (lambda: Concatenated([ObliqueFeatures(MAP(8), 2), ObliqueFeatures(BSC(8), 2)]), ["dimension", "BSC"]),
         (lambda: Concatenated([ObliqueFeatures(MAP(8), 2), ObliqueFeatures(MAP(8), 3)]), ["same sensors", "3 and 2"]),
         (lambda: Concatenated([Sum(Level(HRR(8), 3), 2)]), ["element-wise", "HRR"]),
-        (lambda: Concatenated([History(ObliqueFeatures(MAP(8), 2), [1])]), ["history", "past readings"]),
+        (lambda: Concatenated([History(ObliqueFeatures(MAP(8), 2), [1])]), ["past readings", "history"]),
         (
             lambda: Concatenated.from_config(Concatenated([ObliqueFeatures(MAP(8), 2)]).config(), MAP(9)),
             ["[8]", "add up to 9"],
         ),
     ],
 )
-def test_what_does_not_fit_is_named(make: object, words: list[str]) -> None:
-    with pytest.raises(ValueError) as refused:  # noqa: PT011
-        make()  # type: ignore[operator]
-    assert all(word in str(refused.value) for word in words)
+def test_what_does_not_fit_is_named(make: Callable[[], object], words: list[str]) -> None:
+    with pytest.raises(ValueError, match=".*".join(map(re.escape, words))):
+        make()
