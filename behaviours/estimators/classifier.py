@@ -3,13 +3,13 @@
 from dataclasses import replace
 from numbers import Real
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 import torch
 from jaxtyping import Float64, Int64, Shaped
 from sklearn.base import ClassifierMixin
-from sklearn.utils._param_validation import Interval
+from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.multiclass import check_classification_targets
 from sklearn.utils.validation import check_is_fitted
 from torch import Tensor
@@ -42,7 +42,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     | `bins` | the most quantile bins per feature; their edges take features · bins floats |
     | `subset` | the most features that interact in one dimension |
     | `oblique` | the share of weighted sums; None takes 0, 1/4 or 1/2, see below |
-    | `epochs`, `batch_size`, `learning_rate` | of the gradient descent |
+    | `epochs`, `learning_rate` | of the gradient descent |
+    | `batch_size` | its rows per step; "auto" takes a 16th of the distinct rows, at least 16 and at most 128 |
     | `validation_fraction` | with a share above 0, so many rows are held back, and the best program on them is taken |
     | `patience` | with it, training stops after so many epochs without a better program |
     | `random_state` | the seed of codebooks and batches |
@@ -63,7 +64,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     _parameter_constraints: ClassVar[dict[str, Any]] = {
         **QuantileEncoding._parameter_constraints,
         "epochs": AT_LEAST_1,
-        "batch_size": AT_LEAST_1,
+        "batch_size": [*AT_LEAST_1, StrOptions({"auto"})],
         "learning_rate": [Interval(Real, 0, None, closed="neither")],
         "validation_fraction": [Interval(Real, 0, 1, closed="left")],
         "patience": AT_LEAST_1,
@@ -77,7 +78,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         subset: int = 2,
         oblique: float | None = None,
         epochs: int = 50,
-        batch_size: int = 128,
+        batch_size: int | Literal["auto"] = "auto",
         learning_rate: float = 0.05,
         validation_fraction: float = 0.0,
         patience: int = 10,
@@ -117,7 +118,8 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
             self.classes_, labels = self.classes_[held], np.searchsorted(held, rows.targets)
             space = self._class_space(rows._replace(targets=labels))
             shown = Demonstrations(torch.tensor(rows.readings), torch.tensor(labels))
-            behaviour = self._rule(space.seed).fit(space, shown, self._progress(), torch.from_numpy(rows.weights))
+            rule = self._rule(space.seed, len(rows.weights))
+            behaviour = rule.fit(space, shown, self._progress(), torch.from_numpy(rows.weights))
             self.behaviour_ = _counted(behaviour, rows)
         return self
 
@@ -151,7 +153,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
             rows = self._rows(readings, np.searchsorted(self.classes_, y), sample_weight)
             before = self._untrained(self._class_space(rows)) if first else self.behaviour_
             # Each call has another seed, so that it visits its rows in another order.
-            rule = self._rule(before.space.seed + before.report.updates)
+            rule = self._rule(before.space.seed + before.report.updates, len(rows.weights))
             shown = Demonstrations(torch.tensor(rows.readings), torch.tensor(rows.targets))
             behaviour = rule.partial_fit(before, shown, self._progress(), torch.from_numpy(rows.weights))
             self.behaviour_ = _counted(behaviour, rows)
@@ -160,7 +162,7 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
     def check_parameters(self) -> None:
         """See `QuantileEncoding.check_parameters`."""
         super().check_parameters()
-        self._rule(seed=0)
+        self._rule(seed=0, rows=1)
 
     def _class_space(self, rows: Rows) -> Space:
         count = len(self.classes_)
@@ -168,9 +170,13 @@ class BehaviourClassifier(ClassifierMixin, QuantileEncoding):
         actuators = [Actuator("class", 0, count - 1, levels=count)]
         return self._space(rows, actuators, lambda chosen: one_hot(labels[chosen], count).double())
 
-    def _rule(self, seed: int) -> Gradient:
+    def _rule(self, seed: int, rows: int) -> Gradient:
+        """The rule that trains on so many distinct rows."""
         names = ("epochs", "batch_size", "learning_rate", "validation_fraction", "patience")
-        return Gradient(**{name: getattr(self, name) for name in names}, sparse=True, seed=seed)
+        options = {name: getattr(self, name) for name in names}
+        if self.batch_size == "auto":
+            options["batch_size"] = min(128, max(16, rows // 16))
+        return Gradient(**options, sparse=True, seed=seed)
 
     def _untrained(self, space: Space) -> Behaviour:
         """A behaviour that has all classes as results, and no known conditions."""

@@ -109,7 +109,7 @@ def test_the_rules_weights_are_checked_and_only_ratios_matter() -> None:
 
 def test_training_stops_when_held_back_rows_do_not_improve() -> None:
     rows, labels = load_digits(n_class=4, return_X_y=True)
-    options: Any = {"dim": 500, "random_state": 0, "epochs": 60, "validation_fraction": 0.2}
+    options: Any = {"dim": 500, "random_state": 0, "epochs": 60, "batch_size": 128, "validation_fraction": 0.2}
     model = BehaviourClassifier(**options, patience=3).fit(rows[:400], labels[:400])
     assert 4 <= model.behaviour_.report.epochs < 30
     longer = BehaviourClassifier(**options, patience=60).fit(rows[:400], labels[:400])

@@ -118,6 +118,20 @@ def test_batches_are_learned_one_after_the_other() -> None:
     assert model.behaviour_.report.epochs == 20
 
 
+@pytest.mark.parametrize(("rows", "size"), [(100, 16), (640, 40), (1920, 120), (2400, 128)])
+def test_few_rows_come_in_small_batches(rows: int, size: int) -> None:
+    x = np.random.default_rng(0).normal(size=(rows, 2))
+    y = x[:, 0] > 0
+    options = {"dim": 100, "bins": 8, "oblique": 0, "epochs": 2, "random_state": 0}
+    auto, given = BehaviourClassifier(**options), BehaviourClassifier(**options, batch_size=size)
+    np.testing.assert_array_equal(auto.fit(x, y).decision_function(x), given.fit(x, y).decision_function(x))
+    # Equal rows count once.
+    twice = BehaviourClassifier(**options).fit(np.r_[x, x], np.r_[y, y])
+    assert twice.behaviour_.report.updates == given.behaviour_.report.updates
+    again = auto.partial_fit(x, y).behaviour_.report.updates
+    assert again == 2 * given.behaviour_.report.updates
+
+
 def test_classes_may_come_later_than_they_are_named() -> None:
     X, y = load_iris(return_X_y=True)  # noqa: N806
     names = np.array(["c", "a", "b"])[y]
