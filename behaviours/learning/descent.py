@@ -109,7 +109,11 @@ class Descent:
     def predict(self, program: Shaped[Tensor, "d"]) -> Int64[Tensor, "k"]:
         """The index of the result that scores highest, for each condition."""
         indices = torch.arange(len(self.samples.conditions), device=self.items.device)
-        return torch.cat([self._condition_scores(program, part).argmax(1) for part in indices.split(_ROWS)])
+        # One preallocated tensor: many small ones between large temporary ones would fragment the memory.
+        predicted = torch.empty_like(indices)
+        for part, into in zip(indices.split(_ROWS), predicted.split(_ROWS), strict=True):
+            into.copy_(self._condition_scores(program, part).argmax(1))
+        return predicted
 
     def run(
         self, train: Tensor, validation: Tensor, generator: torch.Generator, progress: Progress

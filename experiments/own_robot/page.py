@@ -16,7 +16,7 @@ from experiments.kit.columns import Column, Table
 from experiments.kit.figures import legend_below, lines
 from experiments.kit.page import Page, Section
 from experiments.own_robot.regions import REGIONS, contradictions, next_demonstrations, regions, runs
-from experiments.own_robot.tables import score_table, with_unit
+from experiments.own_robot.tables import error_format, score_table, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +53,8 @@ def headline(learned: Learned) -> str:
     for actuator in learned.schema.actuators:
         rival = min(RIVALS, key=lambda name: rows[name][actuator.name])
         mine, theirs = rows[learned.kind][actuator.name], rows[rival][actuator.name]
-        parts.append(f"{with_unit(actuator)} is off by {mine:.3g} on average ({rival}: {theirs:.3g})")
+        form = error_format(actuator)
+        parts.append(f"{with_unit(actuator)} is off by {mine:{form}} on average ({rival}: {theirs:{form}})")
     return f"In {_held(learned)} that were not shown, {'; '.join(parts)}."
 
 
@@ -70,7 +71,7 @@ def _scores(section: Section, learned: Learned) -> None:
                 Column("run", _held(learned).removesuffix("s") if learned.by else "stretch"),
                 Column("rows", format=","),
                 *(
-                    Column(f"{model} {actuator.name}", f"{actuator.name}: {model}", ".3g", best="min")
+                    Column(f"{model} {actuator.name}", f"{actuator.name}: {model}", error_format(actuator))
                     for actuator in learned.schema.actuators
                     for model in (learned.kind, *RIVALS)
                 ),
@@ -161,7 +162,7 @@ def _unfamiliar(section: Section, learned: Learned) -> None:
         for name, which in (("familiar", ~strange), ("unfamiliar", strange))
     ]
     columns = [Column("rows"), Column("count", "rows", ",")]
-    columns += [Column(a.name, f"{with_unit(a)}: error", ".3g", best="min") for a in learned.schema.actuators]
+    columns += [Column(a.name, f"{with_unit(a)}: error", error_format(a)) for a in learned.schema.actuators]
     section.table(Table("Errors where readings are familiar, and where not", columns).show(rows))
 
 
@@ -183,7 +184,7 @@ def _sizes(section: Section, learned: Learned) -> None:
     frame = pd.DataFrame(learned.by_size)
     section.text("More dimensions hold more; more bins tell closer readings apart, and need more rows.")
     columns = [Column("dim", "d", ","), Column("bins", "bins per sensor", ",")]
-    columns += [Column(a.name, f"{with_unit(a)}: error", ".3g", best="min") for a in learned.schema.actuators]
+    columns += [Column(a.name, f"{with_unit(a)}: error", error_format(a), best="min") for a in learned.schema.actuators]
     section.table(Table("Error by d and bins", columns, "In the first fold.").show(learned.by_size))
     section.figure(
         "sizes",

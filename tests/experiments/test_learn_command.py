@@ -13,14 +13,14 @@ import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
-from behaviours import BehaviourBank
+from behaviours import Actuator, BehaviourBank
 from behaviours.commands.learn import Learned, learn, options_of
 from behaviours.commands.schema_file import read_schema
 from behaviours.commands.validate import LEVELS, RIVALS, SMOOTH
 from behaviours.data import read_csv
 from experiments.main import main
 from experiments.own_robot.regions import contradictions, next_demonstrations, runs
-from experiments.own_robot.tables import score_table
+from experiments.own_robot.tables import error_format, score_table
 
 RUNS, ROWS = 4, 120
 
@@ -111,6 +111,11 @@ def test_scores_are_mean_errors_in_runs_that_were_not_shown(log: Path) -> None:
     relative = {kind: rows[kind]["v"] / 0.25 + rows[kind]["omega"] / 2 for kind in (LEVELS, SMOOTH)}
     assert found.kind == min(relative, key=lambda kind: relative[kind])
     assert rows[found.kind]["omega"] < rows["mean"]["omega"] / 4
+
+
+@pytest.mark.parametrize(("low", "high", "shown"), [(-1, 1, "0.0123"), (0, 255, "0.01"), (0, 0.004, "0.0123457")])
+def test_errors_have_the_decimals_that_their_range_needs(low: float, high: float, shown: str) -> None:
+    assert format(0.0123456789, error_format(Actuator("v", low, high))) == shown
 
 
 def test_commands_of_few_levels_are_classes(log: Path) -> None:
