@@ -151,7 +151,7 @@ def _number(text: str) -> tuple[float, str]:
 
 
 def _print(console: Console, table: Table) -> None:
-    console.print(table.show(table.rows[:MOST_ROWS]).terminal())
+    table.show(table.rows[:MOST_ROWS]).print(console)
     if len(table.rows) > MOST_ROWS:
         console.print(f"the first {MOST_ROWS} of {len(table.rows):,} rows; the page has more", soft_wrap=True)
 

@@ -17,10 +17,15 @@ from typing import Any, Literal
 
 import pandas as pd
 import rich.table
+from rich.cells import cell_len
+from rich.console import Console
 from rich.markup import escape
+from rich.measure import Measurement
 
 NONE = "-"
 """How a value that does not exist is shown."""
+_WIDEST = 10_000
+"""More characters than a line of any table has."""
 
 Row = Mapping[str, Any]
 
@@ -122,17 +127,22 @@ class Table:
         columns = [column.cells(self.rows) for column in self.columns]
         return [list(row) for row in zip(*columns, strict=True)] if self.rows else []
 
-    def terminal(self) -> rich.table.Table:
-        """The table for rich's console."""
+    def print(self, console: Console) -> None:
+        """Print the table; on a narrow terminal titles of columns wrap, then whole lines, and no number is cut off."""
         table = rich.table.Table(title=self.title)
         for place, column in enumerate(self.columns):
             table.add_column(
-                escape(column.title), justify="left" if place == 0 or self.words else "right", no_wrap=True
+                escape(column.title),
+                justify="left" if place == 0 or self.words else "right",
+                min_width=max((cell_len(row[place].text) for row in self.cells), default=0),
             )
         for row in self.cells:
             texts = [(escape(cell.text), cell.mark) for cell in row]  # a list such as [a,b] is no markup
             table.add_row(*(f"[bold green]{text}" if mark == "best" else text for text, mark in texts))
-        return table
+        least = Measurement.get(console, console.options.update(width=_WIDEST), table).minimum
+        if least > console.width:
+            table.width = least
+        console.print(table, crop=False)
 
     def markdown(self) -> str:
         """The table for a README or an issue."""

@@ -130,7 +130,7 @@ class _Job:
                     folder.rmdir()  # which Hydra makes, also for settings that are refused
                 raise
         for table in study.shown(outcome):
-            console.print(table.terminal())
+            table.print(console)
         report = outcome.folder / "report.html"
         console.print(f"{report} shows it; results.json and records.parquet are in the same folder", soft_wrap=True)
         return None if study.objective is None else outcome.metrics.get(study.objective)

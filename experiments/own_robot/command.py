@@ -19,7 +19,7 @@ def learn_log(arguments: Sequence[str]) -> int:
         print(f"{proposed(options)} says what each column is; correct it, and learn with --schema {options.propose}")
         return 0
     learned = learn(options, shown_progress)
-    wide_console().print(score_table(learned).terminal())
+    score_table(learned).print(wide_console())
     written = str(options.output)
     if options.page is not None:
         from experiments.own_robot.page import write_page  # which imports what draws

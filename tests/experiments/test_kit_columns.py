@@ -39,9 +39,10 @@ def test_markdown_has_intervals_dashes_and_the_best_of_what_compares() -> None:
     ]
 
 
-def test_the_terminal_shows_the_same() -> None:
+@pytest.mark.parametrize("width", [20, 45, 100])
+def test_the_terminal_shows_the_same_however_narrow_it_is(width: int) -> None:
     shown = io.StringIO()
-    Console(file=shown, width=100).print(TABLE.terminal())
+    TABLE.print(Console(file=shown, width=width))
     for text in ("Rates", "0.50 [0.25, 0.75]", "1,000", "2.0"):
         assert text in shown.getvalue()
     assert "note" not in shown.getvalue()
