@@ -1,7 +1,7 @@
 """Demonstrations as index arrays into their distinct conditions and results."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import torch
 from jaxtyping import Bool, Float64, Int64, Shaped
@@ -9,7 +9,7 @@ from torch import Tensor
 
 from behaviours.demonstrations import Demonstrations
 from behaviours.learning.conditions import LazyConditions, encode_distinct
-from behaviours.ordered import distinct_rows
+from behaviours.ordered import distinct_rows, first_rows
 from behaviours.progress import Progress, no_progress
 from behaviours.report import LearningReport
 from behaviours.space import Space
@@ -95,15 +95,14 @@ class Samples:
     def targets(self, contradictions: Contradictions) -> Int64[Tensor, "k"]:
         """The index of the result to learn for each condition, with contradictions resolved."""
         rows = torch.arange(len(self.condition), device=self.condition.device)
-        conditions, results = len(self.conditions), len(self.results)
         if contradictions == "majority":
-            cells = self.condition * results + self.result
-            counts = torch.bincount(cells, minlength=conditions * results).view(conditions, results)
-            first = torch.full_like(counts.view(-1), len(rows)).scatter_reduce(0, cells, rows, "amin")
-            most_frequent = counts == counts.amax(-1, keepdim=True)
-            return torch.where(most_frequent, first.view_as(counts), len(rows)).argmin(-1)
+            pairs = self._pairs()
+            often = pairs.shown == self._most(pairs)[pairs.condition]
+            first = first_rows(pairs.of_sample)[often]
+            chosen = torch.full((len(self.conditions),), len(rows), device=rows.device)
+            return self.result[chosen.scatter_reduce(0, pairs.condition[often], first, "amin")]
         pick = "amin" if contradictions == "first" else "amax"
-        chosen = torch.zeros(conditions, dtype=torch.int64, device=rows.device)
+        chosen = torch.zeros(len(self.conditions), dtype=torch.int64, device=rows.device)
         return self.result[chosen.scatter_reduce(0, self.condition, rows, pick, include_self=False)]
 
     def items(self, space: Space) -> Shaped[Tensor, "r+s d"]:
@@ -120,9 +119,22 @@ class Samples:
 
     def missed(self, predicted: Int64[Tensor, "k"]) -> Bool[Tensor, "k"]:
         """Whether the predicted result of each condition is none of its most frequent results."""
-        shape = len(self.conditions), len(self.results)
-        counts = torch.bincount(self.condition * shape[1] + self.result, minlength=shape[0] * shape[1]).view(shape)
-        return counts.gather(1, predicted[:, None])[:, 0] < counts.amax(1)
+        pairs = self._pairs()
+        asked = torch.arange(len(predicted), device=predicted.device) * len(self.results) + predicted
+        place = torch.searchsorted(pairs.cell, asked).clamp(max=len(pairs.cell) - 1)
+        return torch.where(pairs.cell[place] == asked, pairs.shown[place], 0) < self._most(pairs)
+
+    def _pairs(self) -> "_Pairs":
+        # A table of all conditions and results would take 8 · k · r bytes, gigabytes for a million conditions.
+        results = len(self.results)
+        cells = self.condition * results + self.result
+        cell, of_sample, shown = cells.unique(return_inverse=True, return_counts=True)
+        return _Pairs(cell, cell // results, of_sample, shown)
+
+    def _most(self, pairs: "_Pairs") -> Int64[Tensor, "k"]:
+        """How often the most frequent result of each condition was shown."""
+        most = torch.zeros(len(self.conditions), dtype=torch.int64, device=pairs.shown.device)
+        return most.scatter_reduce(0, pairs.condition, pairs.shown, "amax")
 
     def report(self, rule: str, **counts: Any) -> LearningReport:
         """The report of a rule that learns every condition; `counts` are further fields of it."""
@@ -135,6 +147,18 @@ class Samples:
         for block in self.conditions.split(_ROWS):
             total = total + vsa.superpose(block)
         return total
+
+
+class _Pairs(NamedTuple):
+    """The p distinct pairs of a condition and a result that were shown."""
+
+    cell: Int64[Tensor, "p"]
+    """condition · r + result, ascending."""
+    condition: Int64[Tensor, "p"]
+    of_sample: Int64[Tensor, "N"]
+    """The pair of each sample."""
+    shown: Int64[Tensor, "p"]
+    """How often each was shown."""
 
 
 def _others(
