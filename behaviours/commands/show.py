@@ -21,7 +21,7 @@ def show(path: str | Path) -> str:
 
 def _bank(bank: BehaviourBank) -> Iterator[str]:
     schema, parts = bank.space.schema, bank.space
-    yield f"bank of {len(bank)} behaviours over {parts.vsa}"
+    yield f"bank of {len(bank)} behaviour{'' if len(bank) == 1 else 's'} over {parts.vsa}"
     yield f"encoder     {parts.encoder.config()['name']}, protection {parts.protect.config()['name']}"
     for sensor in schema.sensors:
         unit = f" {sensor.unit}" if sensor.unit else ""
@@ -36,9 +36,11 @@ def _bank(bank: BehaviourBank) -> Iterator[str]:
             if len(behaviour.space.sensors) == len(schema.sensors)
             else f", uses {', '.join(behaviour.space.sensors)}"
         )
-        wrong = f", {report.wrong} not recalled" if report.wrong else ""
+        missed = "off by more than half a level" if behaviour.smooth else "not recalled"
+        wrong = f", {report.wrong} {missed}" if report.wrong else ""
         made = f"sum of {', '.join(report.terms)}" if report.terms else f"{report.pairs} pairs by {report.rule}{wrong}"
-        yield f"behaviour   {name}: {made}, {len(behaviour.results)} results{used}"
+        gives = "smooth commands" if behaviour.smooth else f"{len(behaviour.results)} results"
+        yield f"behaviour   {name}: {made}, {gives}{used}"
 
 
 def _demonstrations(shown: Demonstrations) -> Iterator[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from behaviours import Actuator, BehaviourBank, Demonstrations, Schema, Sensor, Space
+from behaviours import Actuator, BehaviourBank, Demonstrations, LeastSquares, Schema, Sensor, Space
 from behaviours.commands.ask import MEASURES, ask
 from behaviours.commands.show import show
 
@@ -106,13 +106,17 @@ def test_a_bank_of_several_asks_which(path: Path) -> None:
 def test_files_are_described(path: Path, tmp_path: Path) -> None:
     told = show(path)
     for part in (
-        "bank of 1 behaviours over MAP-C(dim=4000, dtype=int8)",
+        "bank of 1 behaviour over MAP-C(dim=4000, dtype=int8)",
         "front: 0 to 4 m, real",
         "gear: one of low, high, categorical",
         "turn: -1 to 1 rad/s, 3 levels",
         "drive: 4 pairs by",
+        " results",
     ):
         assert part in told
+    smooth = BehaviourBank.load(path)
+    smooth.learn("smoothly", Demonstrations(ROWS, COMMANDS, schema=SCHEMA), LeastSquares(smooth=True))
+    assert "behaviour   smoothly: 4 pairs by least_squares, smooth commands" in show(smooth.save(tmp_path / "smooth"))
     shown = Demonstrations([[1.0, math.nan], [2.0, 3.0]], [[0.5], [1]], [0, 1], sensor_names=["a", "b"])
     told = show(shown.save(tmp_path / "shown.safetensors"))
     assert told.splitlines() == [
