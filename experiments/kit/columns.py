@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -20,12 +21,11 @@ import rich.table
 from rich.cells import cell_len
 from rich.console import Console
 from rich.markup import escape
-from rich.measure import Measurement
+
+from experiments.kit.console import fitting, line_width, widened
 
 NONE = "-"
 """How a value that does not exist is shown."""
-_WIDEST = 10_000
-"""More characters than a line of any table has."""
 
 Row = Mapping[str, Any]
 
@@ -128,21 +128,25 @@ class Table:
         return [list(row) for row in zip(*columns, strict=True)] if self.rows else []
 
     def print(self, console: Console) -> None:
-        """Print the table; on a narrow terminal titles of columns wrap, then whole lines, and no number is cut off."""
-        table = rich.table.Table(title=self.title)
-        for place, column in enumerate(self.columns):
-            table.add_column(
-                escape(column.title),
-                justify="left" if place == 0 or self.words else "right",
-                min_width=max((cell_len(row[place].text) for row in self.cells), default=0),
-            )
-        for row in self.cells:
-            texts = [(escape(cell.text), cell.mark) for cell in row]  # a list such as [a,b] is no markup
-            table.add_row(*(f"[bold green]{text}" if mark == "best" else text for text, mark in texts))
-        least = Measurement.get(console, console.options.update(width=_WIDEST), table).minimum
-        if least > console.width:
-            table.width = least
-        console.print(table, crop=False)
+        """Print the table; no number is cut off.
+
+        Where it is too wide for a terminal, titles of columns wrap, and the columns that still do not fit stand in
+        further tables below, each beside the first column. A file gets long lines.
+        """
+        rows, title = self.cells, self.title or None
+        words = [[row[place].text for row in rows] + column.title.split() for place, column in enumerate(self.columns)]
+        least = [max(map(cell_len, each)) for each in words]
+        for part in fitting(least, console.width if console.is_terminal else math.inf):
+            titles = [self.columns[place].title for place in part]
+            widths = widened([least[place] for place in part], [cell_len(text) for text in titles], console.width)
+            table = rich.table.Table(title=title, width=line_width(widths))
+            for place, text, width in zip(part, titles, widths, strict=True):
+                table.add_column(escape(text), justify="left" if place == 0 or self.words else "right", width=width)
+            for row in rows:
+                texts = [(escape(row[place].text), row[place].mark) for place in part]  # [a,b] is no markup
+                table.add_row(*(f"[bold green]{text}" if mark == "best" else text for text, mark in texts))
+            console.print(table, crop=False)
+            title = None
 
     def markdown(self) -> str:
         """The table for a README or an issue."""

@@ -39,13 +39,25 @@ def test_markdown_has_intervals_dashes_and_the_best_of_what_compares() -> None:
     ]
 
 
-@pytest.mark.parametrize("width", [20, 45, 100])
-def test_the_terminal_shows_the_same_however_narrow_it_is(width: int) -> None:
+@pytest.mark.parametrize(("width", "parts"), [(20, 3), (30, 2), (46, 2), (47, 1), (100, 1)])
+def test_a_terminal_shows_the_same_however_narrow_it_is(width: int, parts: int) -> None:
     shown = io.StringIO()
-    TABLE.print(Console(file=shown, width=width))
-    for text in ("Rates", "0.50 [0.25, 0.75]", "1,000", "2.0"):
-        assert text in shown.getvalue()
+    TABLE.print(Console(file=shown, width=width, force_terminal=True, color_system=None))
+    lines = shown.getvalue().splitlines()
+    assert max(map(len, lines)) <= max(width, len("│ name │ 0.50 [0.25, 0.75] │"))
+    assert sum("1,000" in line for line in lines) == 1
+    for text in ("Rates", "0.50 [0.25, 0.75]", "2.0"):
+        assert shown.getvalue().count(text) == 1
     assert "note" not in shown.getvalue()
+    # Each part has the first column.
+    assert sum("│ b " in line for line in lines) == parts
+
+
+def test_a_file_gets_long_lines() -> None:
+    shown = io.StringIO()
+    TABLE.print(Console(file=shown, width=20))
+    lines = shown.getvalue().splitlines()
+    assert any(all(text in line for text in ("b", "0.75 [0.50, 1.00]", "20", "2.0")) for line in lines)
 
 
 def test_nothing_is_best_among_equals_or_on_other_samples() -> None:
