@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import takewhile
 from typing import Any, Literal
 
 import pandas as pd
@@ -131,12 +132,14 @@ class Table:
         """Print the table; no number is cut off.
 
         Where it is too wide for a terminal, titles of columns wrap, and the columns that still do not fit stand in
-        further tables below, each beside the first column. A file gets long lines.
+        further tables below, each beside the columns of words that lead the table. A file gets long lines.
         """
         rows, title = self.cells, self.title or None
         words = [[row[place].text for row in rows] + column.title.split() for place, column in enumerate(self.columns)]
         least = [max(map(cell_len, each)) for each in words]
-        for part in fitting(least, console.width if console.is_terminal else math.inf):
+        worded = (all(isinstance(row.get(column.key), str) for row in self.rows) for column in self.columns)
+        keys = 1 if self.words else max(1, len(list(takewhile(bool, worded))))
+        for part in fitting(least, console.width if console.is_terminal else math.inf, keys):
             titles = [self.columns[place].title for place in part]
             widths = widened([least[place] for place in part], [cell_len(text) for text in titles], console.width)
             table = rich.table.Table(title=title, width=line_width(widths))

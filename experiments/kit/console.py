@@ -18,13 +18,14 @@ def line_width(widths: Sequence[int]) -> int:
     return 1 + sum(width + 3 for width in widths)
 
 
-def fitting(widths: Sequence[int], most: float) -> list[list[int]]:
-    """The places of columns in parts: the first column, and as many others as fit into a line, at least one."""
-    parts = [[0]]
-    for place in range(1, len(widths)):
-        if len(parts[-1]) > 1 and line_width([widths[each] for each in (*parts[-1], place)]) > most:
-            parts.append([0])
-        parts[-1].append(place)
+def fitting(widths: Sequence[int], most: float, keys: int) -> list[list[int]]:
+    """The places of columns in parts: the first `keys`, and as many others as fit into a line, at least one."""
+    first = list(range(keys))
+    parts = [first]
+    for place in range(keys, len(widths)):
+        if parts[-1] != first and line_width([widths[each] for each in (*parts[-1], place)]) > most:
+            parts.append(first)
+        parts[-1] = [*parts[-1], place]
     return parts
 
 

@@ -53,6 +53,15 @@ def test_a_terminal_shows_the_same_however_narrow_it_is(width: int, parts: int) 
     assert sum("│ b " in line for line in lines) == parts
 
 
+def test_each_part_of_a_wide_table_says_what_its_rows_are() -> None:
+    columns = [Column("vsa"), Column("encoder"), *(Column(f"measure{number}") for number in range(6))]
+    rows = [{"vsa": "map", "encoder": "level"} | {f"measure{number}": number for number in range(6)}]
+    shown = io.StringIO()
+    Table("", columns).show(rows).print(Console(file=shown, width=60, force_terminal=True, color_system=None))
+    found = [[cell.strip() for cell in line.split("│")[1:-1]] for line in shown.getvalue().splitlines() if "│" in line]
+    assert found == [["map", "level", "0", "1", "2"], ["map", "level", "3", "4", "5"]]
+
+
 def test_a_file_gets_long_lines() -> None:
     shown = io.StringIO()
     TABLE.print(Console(file=shown, width=20))
