@@ -6,6 +6,7 @@ import hashlib
 import os
 import pickle
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import contextmanager
@@ -48,9 +49,10 @@ def measured(measure: Measure, material: object, cells: Sequence[Any], workers: 
     # Workers of another backend may have other parents.
     watched = {"initializer": _begin, "initargs": (os.getpid(),)} if _name(backend) == "LokyBackend" else {}
     pool: Any = joblib.Parallel(n_jobs=workers, return_as="generator_unordered", **watched)
-    with without_interrupts():  # in which the processes start
-        found = pool(tasks)
-    yield from found
+    with _workers_may_be_replaced():
+        with without_interrupts():  # in which the processes start
+            found = pool(tasks)
+        yield from found
 
 
 def _on_dask(client: Any, packed: NDArray[np.uint8], digest: str, cells: Sequence[Any]) -> Iterator[tuple[int, Any]]:
@@ -149,7 +151,16 @@ def processes(workers: int) -> Iterator[Executor | None]:
         # call.
         executor = get_memmapping_executor(workers, timeout=60, initializer=_begin, initargs=(os.getpid(),))
         executor.submit(int)  # which starts them
-    yield executor
+    with _workers_may_be_replaced():
+        yield executor
+
+
+@contextmanager
+def _workers_may_be_replaced() -> Iterator[None]:
+    """Within it joblib does not warn when it replaces a process that has grown by 300 MB, which is no fault."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "A worker stopped while some jobs", UserWarning)
+        yield
 
 
 def _begin(parent: int) -> None:

@@ -128,6 +128,33 @@ def test_the_main_command_lists_studies_and_names_what_is_not_there(
         assert words in line
 
 
+_kept: list[bytearray] = []
+
+
+def growing(material: None, cell: int) -> int:
+    """Keep more memory than joblib lets a process grow by, long enough for it to look."""
+    _kept.append(bytearray(b"x") * 400_000_000)
+    time.sleep(1.1)
+    return os.getpid()
+
+
+@pytest.mark.slow
+def test_a_process_that_grows_is_replaced_without_a_warning(tmp_path: Path) -> None:
+    code = (
+        "import sys, warnings; sys.path.insert(0, sys.argv[1]); warnings.simplefilter('always')\n"
+        "from test_kit_command import growing, measured\n"
+        "found = dict(measured(growing, None, range(8), 2))\n"
+        "print(sorted(found), len(set(found.values())))"
+    )
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    run = [sys.executable, "-c", code, str(Path(__file__).parent)]
+    done = subprocess.run(run, cwd=tmp_path, env=environment, capture_output=True, text=True, check=True, timeout=120)
+    cells, count = done.stdout.rsplit(" ", 1)
+    assert cells == str(list(range(8)))
+    assert int(count) > 2
+    assert "worker" not in done.stderr
+
+
 @pytest.mark.slow
 def test_a_sweep_of_four_jobs_two_at_a_time_and_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     log = tmp_path / "log"
