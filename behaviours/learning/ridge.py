@@ -20,6 +20,9 @@ RIDGES = (1.0, 1e-1, 1e-2, 1e-3, 1e-4)
 _CHOSEN_FROM = 2500
 """The weight is chosen with at most this many conditions: the best one hardly depends on their number."""
 
+_BLOCK = 1024
+"""So many rows of the matrix are computed at once, so that nothing else is as large as it."""
+
 EXACT = 1e-3
 """A weight that is small enough to recall what was shown."""
 _FEW = 100
@@ -70,34 +73,43 @@ class RidgeSystem:
             scale = float((rows.double() ** 2).sum()) / pairs
             # A row of weight w is √w times as long.
             roots = weights.sqrt().repeat_interleave(len(r))
-            matrix = (rows @ rows.T).double() * roots[:, None] * roots
+            matrix = (rows @ rows.T).double().mul_(roots[:, None]).mul_(roots)
             progress(1.0)
             return cls(vsa, matrix, roots * targets.reshape(-1), rows.double() * roots[:, None], scale)
         # Element-wise binding makes the d × d matrix of all pairs a product of two small ones. It is a sum over the
         # conditions, which need not be held at once.
         matrix = torch.zeros(vsa.dim, vsa.dim, dtype=torch.float64, device=r.device)
         target, squares = (torch.zeros(vsa.dim, dtype=torch.float64, device=r.device) for _ in range(2))
+        blocks = [slice(start, start + _BLOCK) for start in range(0, vsa.dim, _BLOCK)]
         done = 0
         for part in conditions.split(ROWS):
             c, here = as_bipolar(part).to(kind), slice(done, done + len(part))
-            weighted = weights[here, None].to(kind) * c
-            matrix += (c.T @ weighted).double()
-            target += (weighted.double() * (targets[here] @ r.double())).sum(0)
-            squares += (c.double() ** 2).sum(0)
+            weight = weights[here, None].to(kind)
+            weighted = c if (weight == 1).all() else weight * c
+            for block in blocks:
+                matrix[block] += c[:, block].T @ weighted
+                target[block] += (targets[here] @ r[:, block].double()).mul_(weighted[:, block]).sum(0)
+                squares[block] += (c[:, block].double() ** 2).sum(0)
             done += len(part)
             progress(done / len(conditions))
-        return cls(
-            vsa, matrix.mul_((r.T @ r).double()), target, None, float(squares @ (r.double() ** 2).sum(0)) / pairs
-        )
+        for block in blocks:
+            matrix[block] *= r[:, block].T @ r
+        return cls(vsa, matrix, target, None, float(squares @ (r.double() ** 2).sum(0)) / pairs)
 
-    def program(self, ridge: float) -> Float[Tensor, "d"]:
-        """The solution. Raises `ValueError` if there is none in floats with this ridge."""
-        matrix = self.matrix.clone()
+    def program(self, ridge: float, overwrite: bool = False) -> Float[Tensor, "d"]:
+        """The solution; with `overwrite` it takes the memory of the matrix, so that the system cannot be solved again.
+
+        Raises `ValueError` if there is no solution in floats with this ridge.
+        """
+        # The transpose of a symmetric matrix is the same one, but column by column, in which it is factored in place.
+        matrix = (self.matrix if overwrite else self.matrix.clone()).mT
         matrix.diagonal().add_(ridge * self.scale)
-        factor, failed = torch.linalg.cholesky_ex(matrix)
+        failed = torch.empty((), dtype=torch.int32, device=matrix.device)
+        factor, failed = torch.linalg.cholesky_ex(matrix, out=(matrix, failed))
         if failed:
             raise ValueError(f"ridge={ridge:g} is too small: the system cannot be solved in float64; take a larger one")
-        solution = torch.cholesky_solve(self.target[:, None], factor)[:, 0]
+        half = torch.linalg.solve_triangular(factor, self.target[:, None], upper=False)
+        solution = torch.linalg.solve_triangular(factor.mT, half, upper=True)[:, 0]
         program = solution if self.rows is None else self.rows.T @ solution
         program = program.to(torch.float64 if self.vsa.dtype == torch.float64 else torch.float32)
         if not program.isfinite().all():
@@ -134,7 +146,7 @@ def solve(
     """
     ridge = check_ridge(ridge)
     system = RidgeSystem.of(vsa, conditions, items, targets, weights, lambda done: progress(0.4 * done))
-    program = system.program(ridge)
+    program = system.program(ridge, overwrite=True)
     progress(1.0)
     return program
 
