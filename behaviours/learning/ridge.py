@@ -70,12 +70,13 @@ class RidgeSystem:
             weights = torch.ones(len(conditions), dtype=torch.float64, device=r.device)
         if pairs <= vsa.dim:
             rows = (as_bipolar(conditions[:]).to(kind)[:, None] * r).flatten(0, 1)
-            scale = float((rows.double() ** 2).sum()) / pairs
+            scale = float(rows.to(torch.float64, copy=True).square_().sum()) / pairs
             # A row of weight w is √w times as long.
             roots = weights.sqrt().repeat_interleave(len(r))
             matrix = (rows @ rows.T).double().mul_(roots[:, None]).mul_(roots)
             progress(1.0)
-            return cls(vsa, matrix, roots * targets.reshape(-1), rows.double() * roots[:, None], scale)
+            rows = rows.to(torch.float64, copy=True).mul_(roots[:, None])
+            return cls(vsa, matrix, roots * targets.reshape(-1), rows, scale)
         # Element-wise binding makes the d × d matrix of all pairs a product of two small ones. It is a sum over the
         # conditions, which need not be held at once.
         matrix = torch.zeros(vsa.dim, vsa.dim, dtype=torch.float64, device=r.device)
